@@ -1,4 +1,7 @@
-"""Colour filters before lamp and camera: curves from a folder, in truth a little different."""
+"""Colour filters before lamp and camera, in truth a little different; the monochromator's band.
+
+Filters are curves from a folder. The band is rounder than a triangle and has some stray light.
+"""
 
 import csv
 import zlib

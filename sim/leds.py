@@ -1,4 +1,4 @@
-"""A bank of LEDs behind relays: narrow bands, switched at once, that droop as they warm."""
+"""A bank of LEDs: narrow bands that droop as they warm, behind relays or outputs, with faults."""
 
 import math
 from bisect import bisect_right

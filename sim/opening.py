@@ -26,7 +26,7 @@ from .boards import (
 )
 from .boards.dc4100 import OUTPUTS
 from .camera import SimulatedCamera
-from .camera.body_settings import CameraFaults
+from .camera.faults import CameraFaults
 from .faults import Fault, FaultTime, given
 from .pc import RoomClock, SimulatedDisk
 from .room import Room

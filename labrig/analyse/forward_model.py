@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from labrig.analyse.combined_frames import CombinedFrame, combined
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import LVF_KIND
@@ -206,7 +206,7 @@ class LvfModel(ForwardModel):
 
 
 def forward_models(
-    part: Part, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
+    context: AnalysisContext, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
 ) -> tuple[dict[StripPatch, LvfModel], tuple[str, ...]]:
     """Return the model of every patch of a part, and the reasons for patches without one.
 
@@ -226,7 +226,7 @@ def forward_models(
     DataError
         No patch lies below the filter.
     """
-    calibration = part.inputs[LVF_KIND]
+    calibration = context.inputs[LVF_KIND]
     if calibration is None or calibration.before_camera is None:
         raise UsageError(
             "a spectrum needs the LVF calibrated before the camera: run the protocol "
@@ -234,8 +234,8 @@ def forward_models(
             "process --optics"
         )
     layout, strip, lvf = sensor_layout(frame), calibration.before_camera, calibration.lvf
-    camera, holder = channel_curves(part, layout.channels), _holder_regions(strip)
-    asked = strip_regions(part) if patches is None else patches
+    camera, holder = channel_curves(context, layout.channels), _holder_regions(strip)
+    asked = strip_regions(context) if patches is None else patches
     sliced, refused = slice_strip(asked, strip, layout)
     models: dict[StripPatch, LvfModel] = {}
     for patch, slices in sliced.items():
@@ -249,7 +249,7 @@ def forward_models(
 
 
 def with_white_reference(
-    model: ForwardModel, part: Part, white: FilterFrames | None
+    model: ForwardModel, context: AnalysisContext, white: FilterFrames | None
 ) -> tuple[ForwardModel, tuple[str, ...]]:
     """Condition the model on frames of the grey card, if there are any; return it with warnings.
 
@@ -260,13 +260,13 @@ def with_white_reference(
     """
     if white is None:
         return model, ()
-    optics = part.rig.optics
+    optics = context.rig.optics
     if optics.lamp is None or optics.grey_card is None:
         return model, (
             "the white picture says nothing, since the spectra of lamp and grey card are not "
             "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
         )
-    light = card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
+    light = card_light(lamp_spectrum(context.rig), card_reflectance(context.rig))
     white_frame = combined(white)
     if not white_frame.shows_light:
         return model, ("the white picture is dark or clips throughout; the spectrum does without",)
@@ -322,7 +322,7 @@ def card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
     return Spectrum(lamp.name, fine, lamp.at(fine) * card.at(fine))
 
 
-def channel_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
+def channel_curves(context: AnalysisContext, channels: tuple[str, ...]) -> CameraResponse:
     """Return the curves of the camera, in the order of a frame's channels.
 
     Raises
@@ -331,10 +331,10 @@ def channel_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
         The camera has other channels.
     """
     if len(channels) == 1:
-        name = part.overrides.camera or part.rig.optics.camera
+        name = context.overrides.camera or context.rig.optics.camera
         if name is not None:
             return read_monochrome_camera(name)
-    camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
+    camera = camera_curves(context.rig, context.overrides.camera, context.inputs[LVF_KIND])
     if camera.channels != channels:
         raise DataError(
             f"expected frames with the channels {', '.join(camera.channels)} or one alone, got "

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile, CameraFile
 from labrig.foundation.errors import DataError, UsageError
@@ -139,7 +139,7 @@ def _damage_text(damaged: Mapping[FileRecordT, str]) -> str:
     )
 
 
-def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
+def part_frames(context: AnalysisContext, *roles: str) -> list[FrameRecord]:
     """Return frames of completed units with one of the roles, without those the user excludes.
 
     Raises
@@ -147,13 +147,15 @@ def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
     DataError
         A frame is missing or was changed after the run.
     """
-    require_intact(part.run, roles, part.overrides)
+    require_intact(context.run, roles, context.overrides)
     return [
-        frame for frame in _frames_in_roles(part.run, roles) if not part.overrides.excludes(frame)
+        frame
+        for frame in _frames_in_roles(context.run, roles)
+        if not context.overrides.excludes(frame)
     ]
 
 
-def part_region(part: Part, region: Region) -> Region:
+def part_region(context: AnalysisContext, region: Region) -> Region:
     """Return the protocol's only `region`, or the user's region instead.
 
     Raises
@@ -161,12 +163,12 @@ def part_region(part: Part, region: Region) -> Region:
     UsageError
         The user names a region.
     """
-    if named := [name for name in part.overrides.regions if name]:
+    if named := [name for name in context.overrides.regions if name]:
         raise UsageError(
             f"--roi: expected x,y,width,height, since this run has one region only, got the name "
             f"'{named[0]}'"
         )
-    return part.overrides.regions.get("", region)
+    return context.overrides.regions.get("", region)
 
 
 #: Flag of a frame that begins before the bench is dark.

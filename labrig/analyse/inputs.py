@@ -85,7 +85,7 @@ class Inputs:
 
 
 @dataclass(frozen=True)
-class Part:
+class AnalysisContext:
     """One protocol's part of a run, or all of a run that is not a chain.
 
     Attributes
@@ -100,7 +100,7 @@ class Part:
         The user's settings.
     inputs
         Calibrations that the rig file names, and results of earlier parts of a chain.
-    beside
+    other_parts
         Record of the other parts' units, where samples took turns: the lamp burned for them, too.
     """
 
@@ -109,7 +109,7 @@ class Part:
     rig: RigFile
     overrides: Overrides
     inputs: Inputs
-    beside: RunRecord | None = None
+    other_parts: RunRecord | None = None
 
     def options(self, model: type[OptionsT]) -> OptionsT:
         """Return the measurement's own options, of those that the user gave.
@@ -145,7 +145,7 @@ class AnalysedParts:
     warnings: tuple[str, ...]
 
 
-def analyse_parts(part: Part) -> AnalysedParts:
+def analyse_parts(context: AnalysisContext) -> AnalysedParts:
     """Analyse every part of a chain; each may use the results of earlier ones.
 
     Those of one sample do not use the results of another.
@@ -160,18 +160,18 @@ def analyse_parts(part: Part) -> AnalysedParts:
     results: dict[str, RunResult] = {}
     failures: dict[str, DataError | FitError] = {}
     warnings: list[str] = []
-    inputs = {"": part.inputs}
-    for link in part.protocol.chain():
+    inputs = {"": context.inputs}
+    for link in context.protocol.chain():
         kind = link.protocol.protocol
-        analyse_link = measurement(kind, str(part.run.folder)).load("analysis")
+        analyse_link = measurement(kind, str(context.run.folder)).load("analysis")
         known = inputs.get(link.sample, inputs[""])
-        link_part = Part(
-            part.run.part(link.name),
+        link_part = AnalysisContext(
+            context.run.part(link.name),
             link.protocol,
-            part.rig,
-            part.overrides,
+            context.rig,
+            context.overrides,
             known,
-            part.run.beside(link.name) if link.sample else None,
+            context.run.without_part(link.name) if link.sample else None,
         )
         try:
             result: RunResult = analyse_link(link_part)

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.bench_optics import LedExposure
 from labrig.calibration import CAMERA_KIND
@@ -116,7 +116,7 @@ class LitPatch:
 
 
 def lit_patches(
-    part: Part,
+    context: AnalysisContext,
     role: str,
     begin: str,
     lights: Sequence[str],
@@ -145,13 +145,13 @@ def lit_patches(
     DataError
         Frames are missing, damaged, or of another camera than the calibrated one.
     """
-    camera = part.inputs[CAMERA_KIND]
+    camera = context.inputs[CAMERA_KIND]
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
-    lit, left = (_series(part, each, patches) for each in (role, f"{role}-off"))
+    lit, left = (_series(context, each, patches) for each in (role, f"{role}-off"))
     units = [f"{begin}{light}" for light in lights]
     again = None if first is None else (f"{begin}{first}", f"{AGAIN}{first}")
     return {
-        name: _lit_patch(part, series, left[name], units, again, flicker)
+        name: _lit_patch(context, series, left[name], units, again, flicker)
         for name, series in lit.items()
     }
 
@@ -170,22 +170,24 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
     )
 
 
-def _series(part: Part, role: str, patches: Mapping[str, Region] | None) -> dict[str, Series]:
-    run, camera = part.run, part.inputs[CAMERA_KIND]
-    frames = steady_frames(run, part.overrides, role)
+def _series(
+    context: AnalysisContext, role: str, patches: Mapping[str, Region] | None
+) -> dict[str, Series]:
+    run, camera = context.run, context.inputs[CAMERA_KIND]
+    frames = steady_frames(run, context.overrides, role)
     if not frames:
         raise DataError(
             f"{run.folder}: there are no complete '{role}' frames; go on with: labrig resume "
             f"{run.folder}"
         )
     require_calibrated_camera(camera, run, run.frames(role))
-    darks = steady_frames(run, part.overrides, FrameRole.DARK)
-    regions = part.overrides.patches(part.protocol) if patches is None else patches
+    darks = steady_frames(run, context.overrides, FrameRole.DARK)
+    regions = context.overrides.patches(context.protocol) if patches is None else patches
     return reduce_patches(frames, regions, darks, camera=camera)
 
 
 def _lit_patch(
-    part: Part,
+    context: AnalysisContext,
     series: Series,
     left: Series,
     units: Sequence[str],
@@ -198,8 +200,8 @@ def _lit_patch(
     }
     if missing := [unit for unit in units if unit not in lit or unit not in off]:
         raise DataError(
-            f"{part.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
-            f"resume {part.run.folder}"
+            f"{context.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
+            f"resume {context.run.folder}"
         )
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]

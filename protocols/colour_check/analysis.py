@@ -19,7 +19,7 @@ from labrig.analyse.forward_model import (
     with_white_reference,
 )
 from labrig.analyse.frames import steady_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.place_reduction import reduce_places
 from labrig.analyse.strip import StripPatch
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
@@ -272,7 +272,7 @@ class ThroughColours:
     shift_nm: float
 
 
-def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
+def through_colours(context: AnalysisContext, chart: PublishedChart) -> ThroughColours | None:
     """Return the colours of the patches that were seen through the filter; None if none were.
 
     Raises
@@ -282,19 +282,22 @@ def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
     DataError
         Frames are missing or damaged.
     """
-    numbers = [n for n in part.protocol.numbers if patch_unit(n) in part.run.completed()]
+    numbers = [n for n in context.protocol.numbers if patch_unit(n) in context.run.completed()]
     if not numbers:
         return None
-    cards, patches = frames_of(part, CheckFrames.CARD_THROUGH), frames_of(part, CheckFrames.PATCH)
-    darks = steady_frames(part.run, part.overrides, FrameRole.DARK)
-    models, _ = forward_models(part, cards[0], [WHOLE])
+    cards, patches = (
+        frames_of(context, CheckFrames.CARD_THROUGH),
+        frames_of(context, CheckFrames.PATCH),
+    )
+    darks = steady_frames(context.run, context.overrides, FrameRole.DARK)
+    models, _ = forward_models(context, cards[0], [WHOLE])
     bare = models[WHOLE]
     reduction = reduce_places(
-        [*cards, *patches], darks, {WHOLE: bare.slices}, part.inputs[CAMERA_KIND], bare.holder
+        [*cards, *patches], darks, {WHOLE: bare.slices}, context.inputs[CAMERA_KIND], bare.holder
     )[WHOLE]
     white = reduction.of_unit(THROUGH_UNIT)
-    light = card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
-    model, _ = with_white_reference(bare, part, white)
+    light = card_light(lamp_spectrum(context.rig), card_reflectance(context.rig))
+    model, _ = with_white_reference(bare, context, white)
     card_fit = _fitted(model, combined(white), seed=0)
     scale = _luminance(chart, light) / _xyz(chart, card_fit.knots_nm, card_fit.value)[1]
     xyz, drawn = [], []
@@ -310,7 +313,7 @@ def through_colours(part: Part, chart: PublishedChart) -> ThroughColours | None:
         np.array(xyz),
         np.stack(drawn, axis=1),
         card_misfit(bare, combined(white), light),
-        _shift_nm(part, cards, darks),
+        _shift_nm(context, cards, darks),
     )
 
 
@@ -370,9 +373,11 @@ def _by_errors(
     return np.asarray(level * (own @ chart.seen + errors))
 
 
-def _shift_nm(part: Part, cards: Sequence[SeriesFrame], darks: Sequence[SeriesFrame]) -> float:
+def _shift_nm(
+    context: AnalysisContext, cards: Sequence[SeriesFrame], darks: Sequence[SeriesFrame]
+) -> float:
     """Return how far the filter's strip has moved along itself since its calibration, in nm."""
-    calibrated = part.inputs[LVF_KIND]
+    calibrated = context.inputs[LVF_KIND]
     assert calibrated is not None
     assert calibrated.before_camera is not None
     before = calibrated.before_camera
@@ -388,7 +393,7 @@ def _shift_nm(part: Part, cards: Sequence[SeriesFrame], darks: Sequence[SeriesFr
 ODD_BALANCE, ODD_MISFIT, MOVED_NM = 3.5, 2.5, 2.0
 
 
-def analyse(part: Part) -> ColourCheckResult:
+def analyse(context: AnalysisContext) -> ColourCheckResult:
     """Compare a chart's colours, in a plain photograph and through the LVF, with published ones.
 
     Raises
@@ -398,16 +403,16 @@ def analyse(part: Part) -> ColourCheckResult:
     DataError
         Frames are missing or damaged, or no chart is to be seen in them.
     """
-    rig, protocol = part.rig, part.protocol
-    lamp, camera = lamp_spectrum(rig), camera_curves(rig, part.overrides.camera)
+    rig, protocol = context.rig, context.protocol
+    lamp, camera = lamp_spectrum(rig), camera_curves(rig, context.overrides.camera)
     chart = PublishedChart.under(read_colour_chart(protocol.chart), lamp)
-    scene = chart_scene(part, CheckFrames.CHART, CheckFrames.CARD)
+    scene = chart_scene(context, CheckFrames.CHART, CheckFrames.CARD)
     matrix = camera_matrix(camera, lamp)
     # On the grid of the sums, and on the scale on which a white has Y = 1.
     values_of_white = chart.light @ camera.at(GRID_NM)
     matrix = matrix * chart.white[1] / (matrix @ values_of_white)[1]
     plain = plain_colours(scene, chart, camera, card_reflectance(rig), matrix)
-    through = through_colours(part, chart)
+    through = through_colours(context, chart)
     every = tuple(range(len(CHART_PATCHES)))
     plainly, of_plain = checked(chart, every, plain.xyz, plain.drawn)
     filtered, of_through = (

@@ -34,7 +34,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.place_reduction import PatchReduction, reduce_places
 from labrig.analyse.strip import StripPatch, for_each_patch, strip_regions
 from labrig.bench_optics import filter_transmittances
@@ -108,7 +108,7 @@ class CameraFilterModel(ForwardModel):
 
 
 def filter_models(
-    part: Part, select: CameraFilters, frame: SeriesFrame
+    context: AnalysisContext, select: CameraFilters, frame: SeriesFrame
 ) -> dict[StripPatch, ForwardModel]:
     """Return the model of every patch of a part.
 
@@ -126,8 +126,8 @@ def filter_models(
     UsageError
         There is no file of a filter, or there are no camera curves.
     """
-    camera = channel_curves(part, sensor_layout(frame).channels)
-    filters = (None, *filter_transmittances(part.rig, select.filters))
+    camera = channel_curves(context, sensor_layout(frame).channels)
+    filters = (None, *filter_transmittances(context.rig, select.filters))
     knots = [one.wavelength_nm for one in filters if one is not None]
     nodes, weights = quadrature(
         float(KNOTS_NM[0]), float(KNOTS_NM[-1]), camera.wavelength_nm, KNOTS_NM, *knots
@@ -150,13 +150,13 @@ def filter_models(
     system = SpectralSystem(KNOTS_NM, design(passed, sensitivity), np.array(modes))
     return {
         patch: CameraFilterModel(
-            slices={PLACE: patch.region or part.protocol.region},
+            slices={PLACE: patch.region or context.protocol.region},
             holder={},
             camera=camera,
             system=system,
             filters=filters,
         )
-        for patch in strip_regions(part)
+        for patch in strip_regions(context)
     }
 
 
@@ -347,7 +347,7 @@ class _Charge:
     combined: CombinedFrame
 
 
-def analyse(part: Part) -> EmissionSpectrumResult:
+def analyse(context: AnalysisContext) -> EmissionSpectrumResult:
     """Measure Λ* of every patch, and test whether it depends on time and on the lamp.
 
     Raises
@@ -360,43 +360,43 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     FitError
         Too many values clip.
     """
-    intact = intact_frames(part.run, part.overrides, SpectrumFrames.GLOW)
-    frames, stray = without_stray_light(intact, part.inputs[BLANK_KIND])
+    intact = intact_frames(context.run, context.overrides, SpectrumFrames.GLOW)
+    frames, stray = without_stray_light(intact, context.inputs[BLANK_KIND])
     require_calibrated_camera(
-        part.inputs[CAMERA_KIND], part.run, part.run.frames(SpectrumFrames.GLOW)
+        context.inputs[CAMERA_KIND], context.run, context.run.frames(SpectrumFrames.GLOW)
     )
-    models, refused = _models(part, frames.decay[0])
-    white = steady_frames(part.run, part.overrides, SpectrumFrames.WHITE)
+    models, refused = _models(context, frames.decay[0])
+    white = steady_frames(context.run, context.overrides, SpectrumFrames.WHITE)
     reductions = reduce_places(
         [*frames.decay, *white],
         frames.dark,
         {patch: model.slices for patch, model in models.items()},
-        part.inputs[CAMERA_KIND],
+        context.inputs[CAMERA_KIND],
         next(iter(models.values())).holder,
     )
     patches, warnings = for_each_patch(
         list(models),
         lambda patch: _patch_spectrum(
-            part, patch, models[patch], reductions[patch], frames.decay, white=bool(white)
+            context, patch, models[patch], reductions[patch], frames.decay, white=bool(white)
         ),
     )
     return EmissionSpectrumResult(
         patches=patches,
-        warnings=(*timing_warnings(part.run, "spectrum"), *stray, *refused, *warnings),
+        warnings=(*timing_warnings(context.run, "spectrum"), *stray, *refused, *warnings),
     )
 
 
 def _models(
-    part: Part, frame: SeriesFrame
+    context: AnalysisContext, frame: SeriesFrame
 ) -> tuple[Mapping[StripPatch, ForwardModel], tuple[str, ...]]:
     """Return the model of every patch, and the reasons for patches without one."""
-    if part.protocol.select is not None:
-        return filter_models(part, part.protocol.select, frame), ()
-    return forward_models(part, frame)
+    if context.protocol.select is not None:
+        return filter_models(context, context.protocol.select, frame), ()
+    return forward_models(context, frame)
 
 
 def _patch_spectrum(
-    part: Part,
+    context: AnalysisContext,
     patch: StripPatch,
     model: ForwardModel,
     reduction: PatchReduction,
@@ -405,10 +405,10 @@ def _patch_spectrum(
     white: bool,
 ) -> tuple[PatchSpectrum, list[str]]:
     """Return the patch's spectrum, and warnings."""
-    select = part.protocol.select
+    select = context.protocol.select
     charging_lamps = list(dict.fromkeys(lamp_of(frame.unit) for frame in frames))
     card = _card(reduction, select) if white else None
-    model, warnings = with_white_reference(model, part, card)
+    model, warnings = with_white_reference(model, context, card)
     if select is None:
         glows = {lamp: reduction.of_unit(glow_unit(lamp)) for lamp in charging_lamps}
         decisive = DECISIVE if model.white_reference else DECISIVE_WITHOUT_CARD
@@ -422,7 +422,7 @@ def _patch_spectrum(
         decisive, stiffest = np.inf, STIFFEST
     charges, dead = _charges(glows)
 
-    run = part.run.name
+    run = context.run.name
 
     def fitted(frame: CombinedFrame, samples: int) -> SpectrumFit:
         return fit_spectrum(

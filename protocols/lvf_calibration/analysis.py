@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import (
     camera_curves,
@@ -389,7 +389,7 @@ BAD_MISFIT = 3.0
 SHIFTED_NM = 2.0
 
 
-def analyse(part: Part) -> LvfCalibrationResult:
+def analyse(context: AnalysisContext) -> LvfCalibrationResult:
     """Locate the strip and its lines, then fit its bands to the frames of the colour filters.
 
     Raises
@@ -400,7 +400,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
         There are no mercury lines, the filter is the wrong way round, or there are too few colour
         filters.
     """
-    protocol, frames = part.protocol, StripFrames(part)
+    protocol, frames = context.protocol, StripFrames(context)
     strip = frames.find_strip(LvfFrames.FILTER, filter_unit(None)).strip(rising=True)
     before_camera = strip_lines(frames.profile(LvfFrames.LINES, strip), strip, protocol.rising)
     fit = wavelengths_along(before_camera)
@@ -410,15 +410,15 @@ def analyse(part: Part) -> LvfCalibrationResult:
     )
     placed = place_on_sample(on_sample, fit.map)
     bench = Bench(
-        lamp_spectrum(part.rig),
-        card_reflectance(part.rig),
-        camera_curves(part.rig, part.overrides.camera),
+        lamp_spectrum(context.rig),
+        card_reflectance(context.rig),
+        camera_curves(context.rig, context.overrides.camera),
     )
-    all_scenes = _scenes(part, frames, before_camera.strip)
+    all_scenes = _scenes(context, frames, before_camera.strip)
     filter_misfits = tuple(misfits(all_scenes, bench, fit.map))
     scenes = all_scenes.without({misfit.name for misfit in filter_misfits if misfit.left_out})
     lvf_fit = fit_bands(scenes, bench, fit.map)
-    stripes, no_stripes_reason = _stripes(part, frames, placed.strip, lvf_fit, fit.map)
+    stripes, no_stripes_reason = _stripes(context, frames, placed.strip, lvf_fit, fit.map)
     filters = tuple(transmittance.name for transmittance in scenes.filters[1:])
     assert lvf_fit.lvf.sigma is not None, "a calibration tells its σ"
     file = LvfFile(
@@ -432,7 +432,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
         on_sample=stripes.strip if stripes else placed.strip,
         camera=CurveColumns.of(lvf_fit.camera),
         source=f"{len(filters)} colour filters and mercury lines, measured with labrig",
-        run=part.run.name,
+        run=context.run.name,
     )
     return LvfCalibrationResult(
         calibration=file,
@@ -459,28 +459,28 @@ def analyse(part: Part) -> LvfCalibrationResult:
     )
 
 
-def _scenes(part: Part, frames: StripFrames, strip: Strip) -> FilterScenes:
-    completed = part.run.completed()
-    names = [name for name in part.protocol.filter_names() if f"filter-{name}" in completed]
+def _scenes(context: AnalysisContext, frames: StripFrames, strip: Strip) -> FilterScenes:
+    completed = context.run.completed()
+    names = [name for name in context.protocol.filter_names() if f"filter-{name}" in completed]
     lit = [*frames.of(LvfFrames.CARD), *frames.of(LvfFrames.FILTER)]
-    values = slice_values(lit, strip, frames.dark, part.inputs[CAMERA_KIND])
+    values = slice_values(lit, strip, frames.dark, context.inputs[CAMERA_KIND])
     return FilterScenes(
         np.array(strip.positions(*frames.size)),
-        [NO_FILTER, *filter_transmittances(part.rig, names)],
+        [NO_FILTER, *filter_transmittances(context.rig, names)],
         [values[f"filter-{name}"] for name in (NO_FILTER.name, *names)],
         values["card"],
     )
 
 
 def _stripes(
-    part: Part,
+    context: AnalysisContext,
     frames: StripFrames,
     strip: Strip,
     lvf_fit: LvfCalibration,
     wavelengths: WavelengthMap,
 ) -> tuple[Stripes | None, str]:
     """Locate the stripes that glow, or return the reason why there are none."""
-    if part.protocol.stripes == "none":
+    if context.protocol.stripes == "none":
         return None, "no stripes were asked for"
     nm = wavelengths.wavelength_nm([0.0, 1.0])
     reason = "no stripes were photographed"

@@ -27,7 +27,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import fit_series
 from labrig.calibration import BLANK_KIND, CAMERA_KIND
 from labrig.fit import EPSILON, LeastSquaresFit, least_squares
@@ -335,7 +335,7 @@ def _target(decay: Curve) -> FloatArray:
     return np.append(decay.value / decay.sigma, 0.0)
 
 
-def analyse(part: Part) -> SaturationResult:
+def analyse(context: AnalysisContext) -> SaturationResult:
     """Compare plateaus, levels of charge under two lights, and shared with individual rates.
 
     Raises
@@ -345,14 +345,16 @@ def analyse(part: Part) -> SaturationResult:
     FitError
         The decays do not allow a fit.
     """
-    protocol, run, camera = part.protocol, part.run, part.inputs[CAMERA_KIND]
-    frames, stray = without_stray_light(intact_frames(run, part.overrides), part.inputs[BLANK_KIND])
+    protocol, run, camera = context.protocol, context.run, context.inputs[CAMERA_KIND]
+    frames, stray = without_stray_light(
+        intact_frames(run, context.overrides), context.inputs[BLANK_KIND]
+    )
     require_calibrated_camera(camera, run, run.frames(FrameRole.DECAY))
-    regions = part.overrides.patches(protocol)
+    regions = context.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
     charge_s, weaker = _charges_s(run), protocol.weaker
     patches = {
-        name: _patch_saturation(patch_series, charge_s, part)
+        name: _patch_saturation(patch_series, charge_s, context)
         for name, patch_series in series.items()
     }
     return SaturationResult(
@@ -381,7 +383,7 @@ def _charges_s(run: RunRecord) -> dict[str, float]:
 
 
 def _patch_saturation(
-    series: Series, unit_charge_s: Mapping[str, float], part: Part
+    series: Series, unit_charge_s: Mapping[str, float], context: AnalysisContext
 ) -> PatchSaturation:
     decays = {decay.unit[0]: decay for decay in series.by_unit()}
     units = list(decays)
@@ -394,8 +396,10 @@ def _patch_saturation(
             "expected two or more complete decays under the full light, got "
             f"{len(full)}; go on with labrig resume"
         )
-    options = part.options(SaturationOptions)
-    states = options.states or (None if part.protocol.states == "auto" else part.protocol.states)
+    options = context.options(SaturationOptions)
+    states = options.states or (
+        None if context.protocol.states == "auto" else context.protocol.states
+    )
     longest = decays[units[full[-1]]]
     fit = fit_series(longest, states, fixed_rates_per_s=options.rate)
     curves = {unit: curve(decay, fit) for unit, decay in decays.items()}
@@ -403,8 +407,8 @@ def _patch_saturation(
     rates = compare_rates(list(curves.values()), start_per_s, flicker_dof(fit))
     charge_s = np.array([unit_charge_s[unit] for unit in units])
     levels: Iterable[Concentration] = ()
-    if part.protocol.weaker is not None and weaker:
-        levels = _levels(rates, charge_s, weaker[-1], full[-1], part.protocol.weaker)
+    if context.protocol.weaker is not None and weaker:
+        levels = _levels(rates, charge_s, weaker[-1], full[-1], context.protocol.weaker)
     begin, end = _growths(*(curves[units[row]] for row in full[-2:]))
     order = compare_levels(list(curves.values()))
     return PatchSaturation(fit, light, charge_s, curves, rates, begin, end, tuple(levels), order)

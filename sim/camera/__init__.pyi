@@ -1,5 +1,6 @@
-from .body_settings import BodySettings as BodySettings, CameraFaults as CameraFaults
+from .body_settings import BodySettings as BodySettings
 from .camera import SimulatedCamera as SimulatedCamera
-from .photograph import Pace as Pace, Sensor as Sensor
-from .ptpip.server import PtpIpServer as PtpIpServer
-from .standard import StandardHabits as StandardHabits
+from .faults import CameraFaults as CameraFaults
+from .photograph import Sensor as Sensor
+from .ptpip.server import Pace as Pace, PtpIpServer as PtpIpServer
+from .standard.body import StandardHabits as StandardHabits

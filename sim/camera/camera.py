@@ -2,17 +2,19 @@
 
 from labrig.foundation.clock import VirtualClock
 
-from .body_settings import BodySettings, CameraFaults
+from .body_settings import BodySettings
 from .eos.body import EosBody
 from .eos.operations import EosOperations
+from .faults import CameraFaults
 from .objects import StoredObject
+from .operations import Operations
 from .photograph import Sensor
-from .power import AutoPowerOff
-from .responder import Operations, Responder
+from .responder import Responder
 from .shutter import Shutter
-from .standard import StandardBody, StandardHabits, StandardOperations
+from .standard.body import StandardBody, StandardHabits
+from .standard.operations import StandardOperations
 from .usb.backend import CameraBackend
-from .usb.cable import Cable
+from .usb.cable import AutoPowerOff, Cable
 from .usb.descriptors import UsbIdentity
 from .usb.still_image import StillImageFunction
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from . import datasets
 from .objects import ObjectStore, StoredObject
-from .responder import Handler, Response, only_code
+from .operations import Handler, Response, only_code
 from .vocabulary import Operation, ResponseCode
 
 _EVERY_HANDLE = 0xFFFFFFFF

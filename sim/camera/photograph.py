@@ -1,9 +1,7 @@
-"""Interface of a simulated room for a camera body, and the room in real time."""
+"""Interface of the simulated room for a camera body: light turned into a RAW file."""
 
 from functools import cached_property
 from typing import Protocol
-
-from labrig.foundation.clock import Clock, VirtualClock
 
 
 class Sensor(Protocol):
@@ -30,28 +28,3 @@ class Photograph:
     def raw(self) -> bytes:
         """Bytes of the RAW file."""
         return self._sensor.photograph(self.start_s, self._exposure_s, self._iso, self._f_number)
-
-
-class Pace:
-    """Coupling of a simulated room's time to that of the PC.
-
-    The room's clock stands still inside a transaction and is advanced before the next.
-
-    Parameters
-    ----------
-    clock
-        The PC's clock.
-    room_clock
-        The room's clock, which nothing else advances.
-    """
-
-    def __init__(self, clock: Clock, room_clock: VirtualClock) -> None:
-        self._clock = clock
-        self._room_clock = room_clock
-        self._zero_s = clock.now() - room_clock.now()
-
-    def catch_up(self) -> float:
-        """Advance the room's clock to the PC's; return the room's time."""
-        behind_s = self._clock.now() - self._zero_s - self._room_clock.now()
-        self._room_clock.spend(max(0.0, behind_s))
-        return self._room_clock.now()

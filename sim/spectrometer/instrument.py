@@ -1,10 +1,9 @@
-"""A USB2000+ behind its endpoints: commands of one byte, its detector, answers in counts.
+"""A USB2000+ behind its endpoints: commands of one byte and their answers.
 
 It integrates all the time: a spectrum that is asked for is that of the integration under way, which
-may have begun before. Source: Ocean Optics' USB2000+ Data Sheet, section "USB Commands".
-
-Source of the sizes: Ocean Optics' data sheet of the USB2000+ (signal to noise 250:1 at full signal,
-dark noise 50 counts, 2048 pixels) and users' spectra of its ILX511B.
+may have begun before. Light on the detector's pixels becomes counts of 16 bits. Sources: Ocean
+Optics' USB2000+ Data Sheet, section "USB Commands"; for the sizes, the same (signal to noise 250:1
+at full signal, dark noise 50 counts, 2048 pixels) and users' spectra of its ILX511B.
 """
 
 import math

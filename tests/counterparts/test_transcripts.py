@@ -16,7 +16,7 @@ from labrig.drivers.ptp.eos.events import Event, ObjectOffered, parse_events
 from labrig.drivers.ptp.standard.object_info import parse_object_info
 from labrig.foundation.clock import VirtualClock
 from labrig.sim.camera.ptpip.packets import Packet
-from labrig.sim.camera.ptpip.server import Transactions
+from labrig.sim.camera.ptpip.transactions import Transactions
 
 from . import transcript
 from .record import PICTURE_BYTES, SESSIONS, body_of

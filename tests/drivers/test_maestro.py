@@ -45,7 +45,7 @@ def test_targets_errors_and_pulses_on_the_wire() -> None:
         ]
     )
     assert issubclass(MaestroDoor, Swing)
-    assert isinstance(driver, Guarded)
+    assert issubclass(MaestroDoor, Guarded)
     driver.swing(safe=False)
     driver.swing(safe=True)
     assert driver.identity() == (

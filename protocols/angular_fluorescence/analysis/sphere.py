@@ -7,7 +7,7 @@ import numpy as np
 from scipy import ndimage, optimize
 
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND
 from labrig.fit.angular import NearLight, SphereImage, fit_shading
 from labrig.foundation.arrays import BoolArray, FloatArray
@@ -290,7 +290,7 @@ class View:
     size: tuple[int, int]
 
 
-def sphere_views(part: Part) -> tuple[tuple[SphereViews, ...], list[str]]:
+def sphere_views(context: AnalysisContext) -> tuple[tuple[SphereViews, ...], list[str]]:
     """Return the views of each LED with their tests, and warnings.
 
     Raises
@@ -300,27 +300,29 @@ def sphere_views(part: Part) -> tuple[tuple[SphereViews, ...], list[str]]:
     UsageError
         The channels cannot be chosen.
     """
-    frames = part_frames(part, *AngularFrames)
-    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, frames)
+    frames = part_frames(context, *AngularFrames)
+    require_calibrated_camera(context.inputs[CAMERA_KIND], context.run, frames)
     views, warnings = [], []
-    for pose in part.protocol.poses():
+    for pose in context.protocol.poses():
         own = [frame for frame in frames if frame.unit == pose.unit]
-        view, warning = _view(part, pose, own)
+        view, warning = _view(context, pose, own)
         if view is None:
             warnings.append(f"{pose.unit}: {warning}; the other views are used")
         else:
             views.append(view)
-    lit = {pose.led: pose.part for pose in part.protocol.poses()}
+    lit = {pose.led: pose.part for pose in context.protocol.poses()}
     tested = []
     for led, light_part in lit.items():
         under_led = [view for view in views if view.pose.led == led]
-        sphere, lines = _tested(part, under_led, led, light_part)
+        sphere, lines = _tested(context, under_led, led, light_part)
         tested.append(sphere)
         warnings += lines
     return tuple(tested), warnings
 
 
-def _view(part: Part, pose: Pose, frames: Sequence[FrameRecord]) -> tuple[View | None, str]:
+def _view(
+    context: AnalysisContext, pose: Pose, frames: Sequence[FrameRecord]
+) -> tuple[View | None, str]:
     """Return a view, or None and why there is none."""
     on = [frame for frame in frames if frame.role == AngularFrames.VIEW]
     off = [frame for frame in frames if frame.role == AngularFrames.OFF]
@@ -328,7 +330,7 @@ def _view(part: Part, pose: Pose, frames: Sequence[FrameRecord]) -> tuple[View |
         return None, "missing (go on with labrig resume)"
     raw = read_raw(on[0].path)
     cell = max(raw.cfa_side, 2)
-    region = part_region(part, part.protocol.region)
+    region = part_region(context, context.protocol.region)
     x, y, wide, high = region_pixels(region, raw.width, raw.height)
     left, top = x // cell, y // cell
     window = slice(top, (y + high) // cell), slice(left, (x + wide) // cell)
@@ -347,38 +349,40 @@ def _mean(frames: Sequence[FrameRecord], window: tuple[slice, slice]) -> FloatAr
 
 
 def _tested(
-    part: Part, views: Sequence[View], led: str, light_part: str
+    context: AnalysisContext, views: Sequence[View], led: str, light_part: str
 ) -> tuple[SphereViews, list[str]]:
     if not views:
         raise DataError(f"{led}: no view is lit and complete; go on with labrig resume")
     channels = views[0].channels
     signal = np.mean([view.light.mean(axis=(0, 1)) for view in views], axis=0)[: len(channels)]
-    response = led_response(part.rig, led, channels, part.overrides.camera)
+    response = led_response(context.rig, led, channels, context.overrides.camera)
     limits = reflected_at_most(signal, response)
-    chosen = chosen_channels(part.protocol.channels, channels, light_part, limits, response)
-    outlines, warnings = _outlines(part, views, chosen)
+    chosen = chosen_channels(context.protocol.channels, channels, light_part, limits, response)
+    outlines, warnings = _outlines(context, views, chosen)
     circles = np.array([[outline.x, outline.y, outline.radius] for outline in outlines])
     mean = _mean_outline(outlines)
     images = [
-        _image(part, view, circle, chosen, response if light_part == "re-radiated" else None, mean)
+        _image(
+            context, view, circle, chosen, response if light_part == "re-radiated" else None, mean
+        )
         for view, circle in zip(views, circles, strict=True)
     ]
     warnings += _cut_warnings(views[0], mean)
-    level = LEVEL / (2 * len(part.protocol.leds))
+    level = LEVEL / (2 * len(context.protocol.leds))
     tested = SphereViews(
         led=led,
         part=light_part,
         channels=tuple(channels[number] for number in chosen),
         reflected_at_most=mixed_limit(signal, limits, chosen),
-        is_lens_known=_flat(part) is not None,
+        is_lens_known=_flat(context) is not None,
         circles=circles,
-        shading=fit_shading(images, _light(part), level),
+        shading=fit_shading(images, _light(context), level),
     )
     return tested, warnings
 
 
-def _light(part: Part) -> NearLight:
-    light = part.protocol.light
+def _light(context: AnalysisContext) -> NearLight:
+    light = context.protocol.light
     side, angle = np.radians(SIDES_DEG[light.side]), np.radians(light.angle)
     across, down = np.sin(angle) * np.cos(side), np.sin(angle) * np.sin(side)
     direction = float(across), float(down), float(np.cos(angle))
@@ -386,20 +390,20 @@ def _light(part: Part) -> NearLight:
 
 
 def _outlines(
-    part: Part, views: Sequence[View], chosen: Sequence[int]
+    context: AnalysisContext, views: Sequence[View], chosen: Sequence[int]
 ) -> tuple[list[Outline], list[str]]:
     """Return the outline of the sphere in each view in pixels, and warnings.
 
     One that the protocol gives is refined by the frames where these show one that is about the
     same. If they show another one, the difference counts as its error.
     """
-    given = part.protocol.circle
+    given = context.protocol.circle
     if given is None:
-        return [_found(part, view, chosen) for view in views], []
+        return [_found(context, view, chosen) for view in views], []
     width, height = views[0].size
     x, y, radius = given.centre[0] * width, given.centre[1] * height, given.radius * width
     try:
-        found = [_found(part, view, chosen) for view in views]
+        found = [_found(context, view, chosen) for view in views]
     except DataError:
         variance = np.full(3, max(GIVEN_SIGMA_PX, GIVEN_SIGMA * radius) ** 2)
         return [Outline(x, y, radius, np.diag(variance))] * len(views), []
@@ -420,8 +424,8 @@ def _outlines(
     return [Outline(x, y, radius, covariance)] * len(views), warnings
 
 
-def _found(part: Part, view: View, chosen: Sequence[int]) -> Outline:
-    side_deg = SIDES_DEG[part.protocol.light.side]
+def _found(context: AnalysisContext, view: View, chosen: Sequence[int]) -> Outline:
+    side_deg = SIDES_DEG[context.protocol.light.side]
     outline = find_outline(view.light[..., chosen].sum(axis=2), side_deg)
     return outline.scaled(view.cell, *view.corner)
 
@@ -459,7 +463,7 @@ def _cut_warnings(view: View, outline: Outline) -> list[str]:
 
 
 def _image(
-    part: Part,
+    context: AnalysisContext,
     view: View,
     circle: FloatArray,
     chosen: Sequence[int],
@@ -488,20 +492,22 @@ def _image(
     across, down, radiance = across[inside], down[inside], radiance[inside]
     by_reflection = reflected_sigma[inside] / np.maximum(radiance, 1e-12)
     normal = np.column_stack([across, down, np.sqrt(1 - across**2 - down**2)])
-    flat, by_lens = _lens(part, rho_squared(x[inside], y[inside], *view.size), chosen)
+    flat, by_lens = _lens(context, rho_squared(x[inside], y[inside], *view.size), chosen)
     covariance = outline.covariance / outline.radius**2
     return SphereImage(normal, radiance / flat, np.stack([by_lens, by_reflection]), covariance)
 
 
-def _flat(part: Part) -> Flat | None:
+def _flat(context: AnalysisContext) -> Flat | None:
     """Return the calibrated flat field of the lens; None if there is none."""
-    camera = part.inputs[CAMERA_KIND]
-    return None if camera is None else camera.flat_at(part.protocol.camera.f_number)
+    camera = context.inputs[CAMERA_KIND]
+    return None if camera is None else camera.flat_at(context.protocol.camera.f_number)
 
 
-def _lens(part: Part, rho2: FloatArray, chosen: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+def _lens(
+    context: AnalysisContext, rho2: FloatArray, chosen: Sequence[int]
+) -> tuple[FloatArray, FloatArray]:
     """Return the lens's known fall-off at some places, and the relative error by an unknown one."""
-    flat = _flat(part)
+    flat = _flat(context)
     if flat is None:
         return np.ones_like(rho2), 1 - (1 + CORNER_TANGENT**2 * rho2) ** -2
     return np.asarray(flat.at(rho2)[:, chosen].mean(axis=1)), flat.sigma * rho2

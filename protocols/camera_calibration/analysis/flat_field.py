@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.analyse.frames import timed, untimed
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CameraFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -174,7 +174,10 @@ NOT_BLACK = 0.2
 
 
 def measure_glare(
-    part: Part, camera: CameraFile, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord]
+    context: AnalysisContext,
+    camera: CameraFile,
+    lit: Sequence[FrameRecord],
+    darks: Sequence[FrameRecord],
 ) -> Glare | None:
     """Return the signal of the trap over the frame's mean signal; None without a trap.
 
@@ -192,7 +195,7 @@ def measure_glare(
     DataError
         The place of the trap is not black.
     """
-    black = part.protocol.black
+    black = context.protocol.black
     if black is None:
         return None
     flats = [frame for frame in lit if frame.role == CardFrames.FLAT]

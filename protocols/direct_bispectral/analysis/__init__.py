@@ -13,7 +13,7 @@ import numpy as np
 from labrig.acquire import LEDS, RigFile, bank_lights
 from labrig.analyse.frames import require_intact
 from labrig.analyse.hyperspectral import direct_columns
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import card_reflectance, filter_transmittances
 from labrig.fit.bispectral import (
     BispectralColumns as BispectralColumns,
@@ -136,7 +136,7 @@ class _Lit:
     window_nm: tuple[float, float] = (0.0, 0.0)
 
 
-def analyse(part: Part) -> DirectBispectralResult:
+def analyse(context: AnalysisContext) -> DirectBispectralResult:
     """Divide the light from every sample by that of the white reference, light by light.
 
     Raises
@@ -147,9 +147,11 @@ def analyse(part: Part) -> DirectBispectralResult:
     UsageError
         The rig file does not name the white reference's reflectance.
     """
-    run, protocol = part.run, part.protocol
-    require_intact(run, [DirectSpectra.DARK, DirectSpectra.LIT, DirectSpectra.OFF], part.overrides)
-    readings = _Readings(part)
+    run, protocol = context.run, context.protocol
+    require_intact(
+        run, [DirectSpectra.DARK, DirectSpectra.LIT, DirectSpectra.OFF], context.overrides
+    )
+    readings = _Readings(context)
     if not readings.lit:
         raise DataError(
             "expected readings of the white reference under some light, got none; go on with "
@@ -157,7 +159,7 @@ def analyse(part: Part) -> DirectBispectralResult:
         )
     whole = [reading for reading in readings.lit.values() if not reading.saturated.any()]
     noise = reading_noise([*whole, *readings.dark.values()])
-    card = card_reflectance(part.rig)
+    card = card_reflectance(context.rig)
     spectra, warnings = _spectra(readings, noise, card)
     whites = {light: spectra.pop((WHITE, light, False)) for light in protocol.lights
               if (WHITE, light, False) in spectra}  # fmt: skip
@@ -165,7 +167,7 @@ def analyse(part: Part) -> DirectBispectralResult:
         protocol.lights,
         whites,
         {light for stage, light, again in readings.lit if stage == WHITE and not again},
-        part.rig,
+        context.rig,
         are_filters=protocol.filters is not None,
     )
     warnings = [*ambient_light(list(readings.dark.values())), *warnings, *of_whites]
@@ -201,7 +203,7 @@ def analyse(part: Part) -> DirectBispectralResult:
             f"no sample was read under a light that can be used: {'; '.join(warnings)}; go on with "
             "labrig resume"
         )
-    lights = [_light_spectrum(name, white, part.rig) for name, white in whites.items()]
+    lights = [_light_spectrum(name, white, context.rig) for name, white in whites.items()]
     return DirectBispectralResult(
         lights=tuple(sorted(lights, key=lambda light: light.mean_nm)),
         samples=samples,
@@ -217,8 +219,8 @@ class _Readings:
     Lit ones, and those just after, by stage, light and whether again; dark ones by stage and time.
     """
 
-    def __init__(self, part: Part) -> None:
-        protocol, self.lit, self.off, self.dark = part.protocol, {}, {}, {}
+    def __init__(self, context: AnalysisContext) -> None:
+        protocol, self.lit, self.off, self.dark = context.protocol, {}, {}, {}
         lit_units = {
             protocol.unit_name(stage, light, again): (stage, light, again)
             for stage in protocol.stages
@@ -226,12 +228,12 @@ class _Readings:
             for again in (False, True)
         }
         for role, readings in ((DirectSpectra.LIT, self.lit), (DirectSpectra.OFF, self.off)):
-            for record in part.run.spectra(role):
-                if not part.overrides.excludes(record) and record.unit in lit_units:
+            for record in context.run.spectra(role):
+                if not context.overrides.excludes(record) and record.unit in lit_units:
                     readings[lit_units[record.unit]] = read_spectrometer_reading(record.path)
         stages = {f"{stage}: dark": stage for stage in protocol.stages}
-        for record in part.run.spectra(DirectSpectra.DARK):
-            if not part.overrides.excludes(record):
+        for record in context.run.spectra(DirectSpectra.DARK):
+            if not context.overrides.excludes(record):
                 key = stages[record.unit], round(record.integration_s, 9)
                 self.dark[key] = read_spectrometer_reading(record.path)
 

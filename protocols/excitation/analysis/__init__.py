@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.analyse.frames import require_intact
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectance
@@ -128,7 +128,7 @@ START_SIGMA = 0.1
 MIN_DARK = 1e-3
 
 
-def analyse(part: Part) -> ExcitationResult:
+def analyse(context: AnalysisContext) -> ExcitationResult:
     """Reduce all charges, and fit those of every patch together.
 
     Raises
@@ -139,21 +139,21 @@ def analyse(part: Part) -> ExcitationResult:
         Nothing glows, or the glow cannot be fitted.
     """
     irradiance, fade, blank = (
-        part.inputs[IRRADIANCE_KIND],
-        part.inputs[FADE_KIND],
-        part.inputs[BLANK_KIND],
+        context.inputs[IRRADIANCE_KIND],
+        context.inputs[FADE_KIND],
+        context.inputs[BLANK_KIND],
     )
     if irradiance is None:
         raise DataError(
             "expected the light on every place of the sample, got none; run irradiance and name "
             "its run in the rig file ('optics: {irradiance: …}') or to labrig process --optics"
         )
-    require_intact(part.run, (*GLOWING, FrameRole.DARK), part.overrides)
+    require_intact(context.run, (*GLOWING, FrameRole.DARK), context.overrides)
     warming = USUAL if fade is None or fade.warming is None else fade.warming
-    chargings, left_out = patch_chargings(part, irradiance, warming)
+    chargings, left_out = patch_chargings(context, irradiance, warming)
     patches, warnings = for_each_patch(
         list(chargings),
-        lambda patch: _patch_excitation(part, patch, chargings[patch], irradiance, warming),
+        lambda patch: _patch_excitation(context, patch, chargings[patch], irradiance, warming),
     )
     unmeasured = () if fade else ("the lamp's fade was not measured: a usual one was taken",)
     leaks = blank.leaks() if blank else ()
@@ -165,18 +165,18 @@ def analyse(part: Part) -> ExcitationResult:
 
 
 def _patch_excitation(
-    part: Part,
+    context: AnalysisContext,
     patch: StripPatch,
     charging: PatchCharging,
     irradiance: IrradianceFile,
     warming: Warming,
 ) -> tuple[PatchExcitation, Sequence[str]]:
     """Return the patch's excitation, and warnings."""
-    decay = fit_series(charging.whole, _states(part, patch))
+    decay = fit_series(charging.whole, _states(context, patch))
     charging = remembered_warmth(charging, decay, warming.deficit, warming.time_constant_s)
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), MIN_DARK).tolist())
     relative_sigmas = RelativeSigmas(
-        flicker=_flicker(part, decay),
+        flicker=_flicker(context, decay),
         lamp=LAMP_SIGMA,
         least_lamp=scatter_by_warmth(charging, warming.deficit_sigma),
         cold_deficit=warming.deficit_sigma,
@@ -191,29 +191,29 @@ def _patch_excitation(
         irradiance=band_sigma(irradiance),
         largest_factor=LARGEST_FACTOR,
     )
-    fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(part) is not None)
-    choice = fits.chosen(part.options(ExcitationOptions).order)
-    if part.inputs[CAMERA_KIND] is None:
+    fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(context) is not None)
+    choice = fits.chosen(context.options(ExcitationOptions).order)
+    if context.inputs[CAMERA_KIND] is None:
         flicker = common_flicker(choice.best, _series(charging), dark)
         relative_sigmas = replace(relative_sigmas, flicker=flicker)
         choice = replace(choice, relative_sigmas=relative_sigmas)
     charging = evened(charging, choice.best)
     even: FittedExcitation | None = None
     if irradiance.lights:
-        by_leds = bool(part.protocol.select.leds)
+        by_leds = bool(context.protocol.select.leds)
         charging, even = _within_bands(charging, irradiance, choice, by_leds=by_leds)
     fit = choice.fitted(
-        _series(charging), "all" if part.options(ExcitationOptions).intervals else "auto"
+        _series(charging), "all" if context.options(ExcitationOptions).intervals else "auto"
     )
     fit = fit if even is None else with_doubt(fit, even)
     density, basis = largest_density(
         irradiance.bands_nm,
-        part.protocol.sample.max_optical_density,
-        patch_reflectance(patch.folder, part.inputs[REFLECTANCE_KIND]),
+        context.protocol.sample.max_optical_density,
+        patch_reflectance(patch.folder, context.inputs[REFLECTANCE_KIND]),
     )
     fit = choice.in_a_layer(_series(charging), fit, density, basis)
     closure = predicted_charging(charging, relative_sigmas, _fitting_by_places(choice, even))
-    run, spectra = part.run, part.inputs.spectra
+    run, spectra = context.run, context.inputs.spectra
     spectrum = patch.own(spectra)
     frames = tuple(frame.path.name for role in GLOWING for frame in run.frames(role))
     material = excited_material(fit, irradiance, spectrum, patch.material, run.name, frames)
@@ -222,11 +222,11 @@ def _patch_excitation(
         if spectra and spectrum is None
         else ()
     )
-    if spectrum is not None and (scale := _scale(part, charging, fit, irradiance, spectrum)):
+    if spectrum is not None and (scale := _scale(context, charging, fit, irradiance, spectrum)):
         material = scale.of(material)
-    material = with_reflectance(material, patch.folder, part.inputs[REFLECTANCE_KIND])
-    material = with_layer(material, part.protocol.sample)
-    material = at_temperature(material, run, part.protocol.rate_frames)
+    material = with_reflectance(material, patch.folder, context.inputs[REFLECTANCE_KIND])
+    material = with_layer(material, context.protocol.sample)
+    material = at_temperature(material, run, context.protocol.rate_frames)
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
         (
@@ -273,7 +273,7 @@ def _fitting_by_places(
 
 
 def _scale(
-    part: Part,
+    context: AnalysisContext,
     charging: PatchCharging,
     fit: FittedExcitation,
     irradiance: IrradianceFile,
@@ -284,7 +284,7 @@ def _scale(
     channel = whole.channels[int(np.argmax(fit.channel_weights))]
     iso, f_number = float(whole.iso[0]), float(whole.f_number[0])
     aperture = None if np.isnan(f_number) else f_number
-    return radiometric_scale(part, irradiance, spectrum, channel, iso, aperture)
+    return radiometric_scale(context, irradiance, spectrum, channel, iso, aperture)
 
 
 def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
@@ -318,18 +318,18 @@ def _closure_warnings(closure: Closure | None) -> Iterator[str]:
         )
 
 
-def _asked_states(part: Part) -> int | None:
+def _asked_states(context: AnalysisContext) -> int | None:
     """Return the number of states that is asked for; None if the data choose it."""
-    protocol_states = part.protocol.states
-    return part.options(ExcitationOptions).states or (
+    protocol_states = context.protocol.states
+    return context.options(ExcitationOptions).states or (
         None if protocol_states == "auto" else protocol_states
     )
 
 
-def _states(part: Part, patch: StripPatch) -> int | None:
+def _states(context: AnalysisContext, patch: StripPatch) -> int | None:
     """Return the number of states of an earlier decay of this patch, if none is asked for."""
-    states = _asked_states(part)
-    if states is None and (decay := patch.own(part.inputs.decays)) is not None:
+    states = _asked_states(context)
+    if states is None and (decay := patch.own(context.inputs.decays)) is not None:
         return decay.n_states
     return states
 
@@ -338,7 +338,7 @@ def _series(charging: PatchCharging) -> list[ChargingSeries]:
     return [charging.through, charging.direct]
 
 
-def _flicker(part: Part, decay: FittedDecay) -> float:
-    if (camera := part.inputs[CAMERA_KIND]) is not None:
+def _flicker(context: AnalysisContext, decay: FittedDecay) -> float:
+    if (camera := context.inputs[CAMERA_KIND]) is not None:
         return camera.flicker
     return decay.flicker if decay.flicker > 0 else TYPICAL_FLICKER

@@ -16,7 +16,7 @@ from numpy.polynomial.legendre import legvander
 from scipy.interpolate import CubicSpline
 
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.calibration import BLANK_KIND, CAMERA_KIND, FADE_KIND, IrradianceFile, Warming
 from labrig.foundation.arrays import BoolArray, FloatArray
@@ -176,7 +176,7 @@ NOTHING: FloatArray = np.empty((0, 0, 0))
 
 
 def patch_chargings(
-    part: Part, irradiance: IrradianceFile, warming: Warming
+    context: AnalysisContext, irradiance: IrradianceFile, warming: Warming
 ) -> tuple[dict[StripPatch, PatchCharging], tuple[str, ...]]:
     """Read and reduce all frames of the run to the charging of each patch, and warnings.
 
@@ -197,18 +197,22 @@ def patch_chargings(
     UsageError
         The irradiance is that of selected lights and the run's charges went through the filter.
     """
-    inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
+    inputs, overrides, protocol = context.inputs, context.overrides, context.protocol
     frames = charge_frames(
-        part.run, overrides, warming.time_constant_s, inputs[BLANK_KIND], part.beside
+        context.run, overrides, warming.time_constant_s, inputs[BLANK_KIND], context.other_parts
     )
-    require_calibrated_camera(inputs[CAMERA_KIND], part.run, list(frames.charge_of))
+    require_calibrated_camera(inputs[CAMERA_KIND], context.run, list(frames.charge_of))
     layout = sensor_layout(next(iter(frames.charge_of)))
     if protocol.select is None:
         strip = irradiance.lvf_strip()
-        sites, reasons = slice_strip(strip_regions(part), strip, layout, len(irradiance.position))
+        sites, reasons = slice_strip(
+            strip_regions(context), strip, layout, len(irradiance.position)
+        )
     else:
         _require_lights(protocol.select, irradiance)
-        sites = {patch: {SAMPLE: patch.region or protocol.sites} for patch in strip_regions(part)}
+        sites = {
+            patch: {SAMPLE: patch.region or protocol.sites} for patch in strip_regions(context)
+        }
         reasons = ()
     series = reduce_patches(
         [
@@ -223,7 +227,7 @@ def patch_chargings(
         | {FRAME: WHOLE_FRAME},
         [
             untimed(frame)
-            for frame in part.run.frames(FrameRole.DARK)
+            for frame in context.run.frames(FrameRole.DARK)
             if not overrides.excludes(frame)
         ],
         camera=inputs[CAMERA_KIND],

@@ -14,7 +14,7 @@ from labrig.analyse.frames import (
     timed,
     untimed,
 )
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import CAMERA_KIND, LVF_KIND, CameraFile, Change, FadeFile, Warming
 from labrig.fit.spectrum import CurveError, camera_modes
@@ -230,7 +230,7 @@ CURVES = CurveError(added=0.02)
 BAD_CHI2, BAD_SIGMAS = 1.2, 4.0
 
 
-def analyse(part: Part) -> FadeResult:
+def analyse(context: AnalysisContext) -> FadeResult:
     """Measure the lamp's turn-off, turn-on and warm-up transients.
 
     Raises
@@ -240,22 +240,22 @@ def analyse(part: Part) -> FadeResult:
     UsageError
         The rig file does not name the curves of lamp and camera.
     """
-    protocol, camera = part.protocol, part.inputs[CAMERA_KIND]
-    curves = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
-    lamp = lamp_spectrum(part.rig)
-    frames = part_frames(part, LampFrames.FADE, LampFrames.RISE, LampFrames.STEADY)
-    require_calibrated_camera(camera, part.run, frames)
-    darks = part_frames(part, FrameRole.DARK)
+    protocol, camera = context.protocol, context.inputs[CAMERA_KIND]
+    curves = camera_curves(context.rig, context.overrides.camera, context.inputs[LVF_KIND])
+    lamp = lamp_spectrum(context.rig)
+    frames = part_frames(context, LampFrames.FADE, LampFrames.RISE, LampFrames.STEADY)
+    require_calibrated_camera(camera, context.run, frames)
+    darks = part_frames(context, FrameRole.DARK)
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     edges = np.array(protocol.bands)
     nm = np.arange(edges[0], edges[-1] + STEP_NM / 2, STEP_NM)
-    places, weights, errors = _places(part, frames, curves, lamp, nm)
+    places, weights, errors = _places(context, frames, curves, lamp, nm)
     bands = _band_weights(edges, lamp, nm)
     changes: dict[str, LampChange] = {}
     tables: dict[str, Change] = {}
     fade: FittedChange | None = None
     for role in SWITCHED if protocol.rise else SWITCHED[:1]:
-        switched = frames_after_switch(part.run, frames, darks, places, camera, role)
+        switched = frames_after_switch(context.run, frames, darks, places, camera, role)
         channel_weights, weight_errors = weights, errors
         if protocol.through_lvf:
             # All channels of a place see the same band: one of them is enough.
@@ -274,7 +274,7 @@ def analyse(part: Part) -> FadeResult:
         fade = change
         changes[role] = change.result(switched)
         tables[role] = _table(change, bands, nm)
-    warm, warming_light = _fit_warming(part, darks, flicker)
+    warm, warming_light = _fit_warming(context, darks, flicker)
     file = FadeFile(
         lamp=lamp.name,
         bands_nm=protocol.bands,
@@ -282,7 +282,7 @@ def analyse(part: Part) -> FadeResult:
         rise=tables.get("rise"),
         warming=warm,
         source="measured with labrig, fade",
-        run=part.run.name,
+        run=context.run.name,
     )
     return FadeResult(
         calibration=file,
@@ -294,17 +294,17 @@ def analyse(part: Part) -> FadeResult:
 
 
 def _fit_warming(
-    part: Part, darks: Sequence[FrameRecord], flicker: float
+    context: AnalysisContext, darks: Sequence[FrameRecord], flicker: float
 ) -> tuple[Warming, WarmingLight] | tuple[None, None]:
-    frames = part_frames(part, LampFrames.WARMING)
+    frames = part_frames(context, LampFrames.WARMING)
     if not frames:
         return None, None
-    card = part_region(part, part.protocol.card)
-    return warming(part.run, frames, darks, card, part.inputs[CAMERA_KIND], flicker)
+    card = part_region(context, context.protocol.card)
+    return warming(context.run, frames, darks, card, context.inputs[CAMERA_KIND], flicker)
 
 
 def _places(
-    part: Part,
+    context: AnalysisContext,
     frames: Sequence[FrameRecord],
     curves: CameraResponse,
     lamp: Spectrum,
@@ -316,12 +316,12 @@ def _places(
     """
     light, sensitivity = lamp.at(nm)[:, np.newaxis], curves.at(nm)
     channel_light = (light * sensitivity).T
-    if not part.protocol.through_lvf:
+    if not context.protocol.through_lvf:
         changes = camera_modes(curves, nm, CURVES)
         light_errors = np.array([(light * change).T for change in changes])
-        card = {"card": part_region(part, part.protocol.card)}
+        card = {"card": part_region(context, context.protocol.card)}
         return card, _normalise(channel_light), _normalised_errors(channel_light, light_errors)
-    lvf = part.inputs[LVF_KIND]
+    lvf = context.inputs[LVF_KIND]
     if lvf is None or lvf.before_camera is None:
         raise DataError(
             "the fade through the variable filter needs its calibration: name it as optics.lvf in "

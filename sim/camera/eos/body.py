@@ -8,13 +8,15 @@ from functools import partial
 from labrig.foundation.clock import Clock
 
 from .. import codes
-from ..body_settings import BodySettings, CameraFaults
+from ..body_settings import BodySettings
+from ..faults import CameraFaults
 from ..objects import CARD_ID, SHOT_BYTES, ObjectStore
 from ..photograph import Photograph, Sensor
 from ..shutter import FOCUS_S, METERING_S, READOUT_S, Exposure, Shutter, Stage
 from ..vocabulary import EosEvent, EosProperty, ResponseCode
 from .events import EventQueue, object_added, record, transfer_request
-from .properties import SELF_TIMER_S, Destination, Drive, PropertyBank, Viewfinder
+from .properties import SELF_TIMER_S, Destination, Drive, PropertyBank
+from .viewfinder import Viewfinder
 
 #: Time from a new value of a property to its event.
 PROPERTY_DELAY_S = 0.03

@@ -2,7 +2,7 @@
 
 from .. import datasets
 from ..object_operations import ObjectOperations
-from ..responder import SESSION_OPERATIONS, Event, Handler, Response, only_code
+from ..operations import SESSION_OPERATIONS, Event, Handler, Response, only_code
 from ..vocabulary import EosEvent, ObjectFormat, Operation, PtpProperty, ResponseCode
 from .body import EosBody
 

@@ -1,0 +1,1 @@
+"""The simulated camera as one that implements nothing but the PTP standard."""
