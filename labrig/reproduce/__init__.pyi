@@ -29,7 +29,6 @@ from .picture.exr import (
     write_spectral_exr as write_spectral_exr,
 )
 from .picture.png import (
-    read_png_texts as read_png_texts,
     write_png as write_png,
 )
 from .picture.render_folder import (

@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from labrig.foundation import colour_science
 from labrig.foundation.arrays import FloatArray
@@ -29,7 +30,6 @@ from labrig.reproduce import (
     exported_meshes,
     load_scene,
     read_linear_exr,
-    read_png_texts,
     read_spectral_exr,
     tristimulus,
 )
@@ -41,6 +41,12 @@ SMALL = ("--size", "12x9", "--paths", "4")
 @pytest.fixture(autouse=True)
 def _in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+
+
+def comment(picture: Path) -> str:
+    """Comment of a PNG file."""
+    with Image.open(picture) as image:
+        return str(image.info["Comment"])
 
 
 def test_pictures_of_all_times_with_what_was_assumed(labrig: Callable[..., Ended]) -> None:
@@ -56,7 +62,7 @@ def test_pictures_of_all_times_with_what_was_assumed(labrig: Callable[..., Ended
     content = json.loads((folder / "render.json").read_text(encoding="utf-8"))
     assert any("pink-paint" in note for note in content["notes"])
     # An assumption is in every picture, too, not only below the sheet.
-    assert all(note in read_png_texts(folder / "001.png")["Comment"] for note in content["notes"])
+    assert all(note in comment(folder / "001.png") for note in content["notes"])
     dark = read_spectral_exr(folder / "001.exr").radiance
     later = read_spectral_exr(folder / "002.exr").radiance
     # One exponential of 0.027 per second, which the glow itself slows by a part in a thousand.
@@ -112,7 +118,7 @@ def test_a_chart_has_its_published_srgb(labrig: Callable[..., Ended]) -> None:
     in_gamut = difference[[name != "cyan" for name in CHART_PATCHES]]
     assert in_gamut.max() < 0.7
     assert in_gamut.mean() < 0.4
-    statement = read_png_texts(ended.run_folder / "000.png")["Comment"]
+    statement = comment(ended.run_folder / "000.png")
     assert "Bradford" in statement
     assert "0.3457, 0.3585" in statement  # of D50, CIE 15
     # Another look needs no new rendering.
@@ -123,7 +129,7 @@ def test_a_chart_has_its_published_srgb(labrig: Callable[..., Ended]) -> None:
     assert (ended.run_folder / "000.exr").stat().st_mtime_ns == before
     yellower = png_lab(ended.run_folder / "000.png")[35, 5]
     assert yellower[2] > seen[18, 2] + 15
-    assert "D65 of luminance 400" in read_png_texts(ended.run_folder / "000.png")["Comment"]
+    assert "D65 of luminance 400" in comment(ended.run_folder / "000.png")
 
 
 def test_other_settings_do_not_mix_with_what_is_there(labrig: Callable[..., Ended]) -> None:

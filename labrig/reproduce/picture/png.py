@@ -9,17 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.foundation.errors import UsageError
-from labrig.foundation.input_file import read_bytes
 from labrig.foundation.output_file import write_durably
 
 Bytes = NDArray[np.uint8]
 
-_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 #: Signature and the chunk IHDR, which has to be the first.
 _HEAD_BYTES = 33
 #: Rendering intent of the chunk sRGB: relative colorimetric.
 _RELATIVE_COLORIMETRIC = b"\x01"
-_MOST_BYTES = 1_000_000_000
 
 
 def write_png(path: Path, picture: Bytes, texts: Mapping[str, str]) -> None:
@@ -45,10 +42,12 @@ def write_png(path: Path, picture: Bytes, texts: Mapping[str, str]) -> None:
     --------
     >>> from pathlib import Path
     >>> import numpy as np
-    >>> from labrig.reproduce import Display, read_png_texts, write_png
+    >>> from PIL import Image
+    >>> from labrig.reproduce import Display, write_png
     >>> transform = Display(white_luminance=80.0).statement
     >>> write_png(Path("dark.png"), np.zeros((2, 3, 3), np.uint8), {"Display transform": transform})
-    >>> read_png_texts(Path("dark.png"))["Display transform"][:42]
+    >>> with Image.open("dark.png") as image:
+    ...     image.info["Display transform"][:42]
     'sRGB (IEC 61966-2-1), D65 of luminance 80 '
     """
     # slow to load
@@ -66,49 +65,6 @@ def write_png(path: Path, picture: Bytes, texts: Mapping[str, str]) -> None:
     chunks = [_chunk(b"sRGB", _RELATIVE_COLORIMETRIC)]
     chunks += [_chunk(b"iTXt", _text(*pair)) for pair in texts.items()]
     write_durably(path, content[:_HEAD_BYTES] + b"".join(chunks) + content[_HEAD_BYTES:])
-
-
-def read_png_texts(path: Path) -> dict[str, str]:
-    """Return the international texts of a PNG file that are not compressed.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-
-    Returns
-    -------
-    dict of str
-        Text of each keyword.
-
-    Raises
-    ------
-    UsageError
-        The file cannot be read or is no PNG.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import numpy as np
-    >>> from labrig.reproduce import read_png_texts, write_png
-    >>> write_png(Path("black.png"), np.zeros((1, 1, 3), np.uint8), {"Comment": "12 s after light"})
-    >>> read_png_texts(Path("black.png"))
-    {'Comment': '12 s after light'}
-    """
-    content = read_bytes(path, _MOST_BYTES)
-    if not content.startswith(_SIGNATURE):
-        raise UsageError(f"{path}: expected a PNG, got another file")
-    texts, place = {}, len(_SIGNATURE)
-    while place + 12 <= len(content):
-        (length,) = struct.unpack_from(">I", content, place)
-        kind, data = content[place + 4 : place + 8], content[place + 8 : place + 8 + length]
-        keyword, _, rest = data.partition(b"\0")
-        if kind == b"iTXt" and rest.startswith(b"\0\0"):
-            # Behind two flags stand the language and the translated keyword, each to its zero.
-            text = rest[2:].split(b"\0", 2)[-1]
-            texts[keyword.decode("latin-1")] = text.decode("utf-8", errors="replace")
-        place += 12 + length
-    return texts
 
 
 def _chunk(kind: bytes, data: bytes) -> bytes:
