@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from filelock import FileLock
@@ -63,6 +63,7 @@ if TYPE_CHECKING:
 # As Python sets it, the collector takes a tenth of the time of all tests.
 gc.set_threshold(20_000, 10, 10)
 SYNC = os.fsync
+PRESENT = pytest.StashKey[pytest.Item]()
 HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
 # In CI the same examples every time, so that a red run is about the change; elsewhere new ones.
@@ -178,26 +179,52 @@ def compiled_once(shared_recordings: None) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def answered_signals() -> Iterator[None]:
     """A command that ended ignores signals, as would all processes that later tests start."""
-    for signum, handler in HANDLERS.items():
-        signal.signal(signum, handler)
+    _answer_signals()
     yield
+    _answer_signals()
+
+
+def _answer_signals() -> None:
     for signum, handler in HANDLERS.items():
-        signal.signal(signum, handler)
+        if signal.getsignal(signum) is not handler:
+            signal.signal(signum, handler)
 
 
-@pytest.fixture(autouse=True)
-def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Remember the present test, for what its markers say of what its fixtures do, too."""
+    item.config.stash[PRESENT] = item
+
+
+@pytest.fixture(scope="session", autouse=True)
+def undrawn(pytestconfig: pytest.Config) -> Iterator[None]:
     """Figures take longer than all else: only tests marked `drawn` draw them.
 
     Those of `tests/analyse` and `tests/recordings`, where every protocol has one, make them.
     """
-    if request.node.get_closest_marker("drawn") is not None:
-        return
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", _leave_blank)
-    if not {"analyse", "recordings"} & set(request.node.path.parts):
-        from labrig.report.page import draw
+    from matplotlib.figure import Figure
 
-        monkeypatch.setattr("labrig.report.page.draw", partial(_draw_blank, draw))
+    from labrig.report import page
+
+    draw, save = page.draw, Figure.savefig
+
+    def is_drawn() -> bool:
+        return pytestconfig.stash[PRESENT].get_closest_marker("drawn") is not None
+
+    def draw_if_asked(
+        sections: "Sequence[Section]", figure_files: "FigureFiles"
+    ) -> "list[RenderedSection]":
+        is_made = {"analyse", "recordings"} & set(pytestconfig.stash[PRESENT].path.parts)
+        drawn = draw if is_drawn() or is_made else partial(_draw_blank, draw)
+        return drawn(sections, figure_files)
+
+    def save_if_asked(figure: Figure, file: object, *arguments: Any, **keys: Any) -> None:
+        (save if is_drawn() else _leave_blank)(figure, file, *arguments, **keys)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(page, "draw", draw_if_asked)
+        patched.setattr(Figure, "savefig", save_if_asked)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -73,9 +73,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
         {"cv2.imwrite", "cv2.VideoWriter", "*.savefig", "PdfPages"},
         # Into memory.
         {
-            "labrig/report/picture_file.py",
             "labrig/report/figure_files.py",
-            "labrig/report/figures_pdf.py",
         },
     ),
     "parse YAML": (

@@ -180,7 +180,7 @@ def plan(
     bench = planned_rig(rig, source)
     clock = bench.clock
     assert isinstance(clock, VirtualClock)
-    protocol = protocol.suited_to(rig)
+    protocol = protocol.resolved_for(rig)
     if offers is not None:
         bench.devices[CAMERA.key] = PlannedCamera(clock, offers)
     offers = bench[CAMERA].offers() if CAMERA in bench else CameraOffers((), ())
@@ -298,8 +298,8 @@ class _PlanRecorder:
     def all_actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self.done if action.device == device]
 
-    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
-        return worst
+    def decide(self, name: str, on_bench: Callable[[], T], when_planned: T) -> T:
+        return when_planned
 
     def seed(self) -> int:
         return zlib.crc32(self.unit.encode())

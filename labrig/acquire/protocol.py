@@ -128,7 +128,7 @@ class ProtocolModel(FrozenModel):
     """
 
     #: Kinds of calibrations on which the results depend.
-    rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
+    requires: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
     #: Whether calibrations that are kept beside the runs are used; not by what measures them anew.
     uses_calibrations: ClassVar[bool] = True
 
@@ -171,7 +171,7 @@ class ProtocolModel(FrozenModel):
         """Return all regions of the frame that the protocol names, by their keys."""
         return regions_in(self)
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the protocol with the values that it takes from the rig file; the base takes none.
 
         Raises
@@ -191,7 +191,7 @@ class ProtocolModel(FrozenModel):
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols whose results this one needs and the rig file does not name."""
-        return [kind.protocol for kind in self.rests_on if rig.optics.named(kind) is None]
+        return [kind.protocol for kind in self.requires if rig.optics.named(kind) is None]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from .hyperspectral import (
     matrix_from_cubes as matrix_from_cubes,
 )
 from .inputs import (
+    AnalysisContext as AnalysisContext,
     Inputs as Inputs,
-    Part as Part,
 )
 from .luminance_table import (
     LuminanceTableOptions as LuminanceTableOptions,

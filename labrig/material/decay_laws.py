@@ -234,23 +234,28 @@ def _trap(rate_per_s: float | FloatArray, shape: float | FloatArray, t_s: FloatA
 
 def log_ratio(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return ℓ(x) = log(1 + x)/x and its derivative, x > −1."""
+    x = np.asarray(x)
     small = np.abs(x) < LOG_SERIES_BELOW
     safe = np.where(small, 1.0, x)
-    y = np.where(small, x, 0.0)
-    series = np.polyval(_LOG_SERIES.reshape(-1, 2, *(1,) * y.ndim), y)
-    ratio = np.where(small, series[0], np.log1p(safe) / safe)
-    slope = np.where(small, series[1], (1 / (1 + safe) - ratio) / safe)
+    ratio = np.asarray(np.log1p(safe) / safe)
+    slope = np.asarray((1 / (1 + safe) - ratio) / safe)
+    if small.any():
+        ratio[small], slope[small] = np.polyval(_LOG_SERIES[..., None], x[small])
     return ratio, slope
 
 
 def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return ψ(x) = (e^x − 1)/x and its logarithmic derivative 1/(1 − e^(−x)) − 1/x."""
+    x = np.asarray(x)
     small = np.abs(x) < SERIES_BELOW
     safe = np.where(small, 1.0, x)
-    series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6))))
-    psi = np.where(small, series, np.expm1(safe) / safe)
-    # 1/2 + x/12 − x³/720 + …
-    slope = np.where(small, 0.5 + x / 12 - x**3 / 720, -1 / np.expm1(-safe) - 1 / safe)
+    psi = np.asarray(np.expm1(safe) / safe)
+    slope = np.asarray(-1 / np.expm1(-safe) - 1 / safe)
+    if small.any():
+        y = x[small]
+        psi[small] = 1 + y / 2 * (1 + y / 3 * (1 + y / 4 * (1 + y / 5 * (1 + y / 6))))
+        # 1/2 + x/12 − x³/720 + …
+        slope[small] = 0.5 + y / 12 - y**3 / 720
     return psi, slope
 
 

@@ -140,7 +140,7 @@ class RunRecord:
         attempts = [_attempt_within(name, attempt) for attempt in self.completed().values()]
         return replace(self, attempts=[attempt for attempt in attempts if attempt is not None])
 
-    def beside(self, name: str) -> "RunRecord":
+    def without_part(self, name: str) -> "RunRecord":
         """Return the completed units of all other parts of a chain, by their whole names."""
         attempts = [
             attempt

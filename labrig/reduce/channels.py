@@ -21,6 +21,8 @@ Indices: TypeAlias = npt.NDArray[np.intp]
 OUTLIER_SIGMAS = 8.0
 #: Standard deviations by which it exceeds all neighbours, which excludes edges of the sample.
 _ABOVE_ALL_SIGMAS = 4.0
+#: Variance of values in steps² above which rounding leaves an error of 0 in their mean.
+_DITHERED_VARIANCE = 20.0
 #: Rows that are searched at once, so that the search takes little memory.
 _ROWS_AT_ONCE = 256
 #: Offsets of the nearest pixels of the same CFA position, in periods of the CFA.
@@ -671,7 +673,9 @@ def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
 
 def _rounding_sigma(std_dn: float, planes: Sequence[PlaneCount]) -> float:
     """Return σ of a mean in DN by rounding, whose error is in all pixels unless values spread."""
-    steps = np.concatenate([np.diff(np.unique(np.rint(plane.value))) for plane in planes])
-    step_dn = int(np.gcd.reduce(steps.astype(np.int64))) if steps.size else 1
-    spread = unrounded_variance(np.array((std_dn / step_dn) ** 2))
-    return step_dn * float(np.sqrt(shared_rounding_variance(spread)))
+    steps = np.concatenate([np.diff(np.rint(plane.value)) for plane in planes])
+    step_dn = int(np.gcd.reduce(steps.astype(np.int64))) or 1
+    spread = (std_dn / step_dn) ** 2
+    if spread > _DITHERED_VARIANCE:
+        return 0.0
+    return step_dn * float(np.sqrt(shared_rounding_variance(unrounded_variance(np.array(spread)))))

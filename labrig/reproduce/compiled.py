@@ -3,6 +3,7 @@
 import os
 import stat
 import sys
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from labrig.foundation.errors import UsageError
 NUMBA_CONFIGURATION = ".numba_config.yaml"
 
 
+@cache
 def compiled(name: str) -> Any:
     """Return a module of this package; functions are compiled, or read from the cache, when used.
 

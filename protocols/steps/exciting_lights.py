@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from labrig.acquire import LAMP_OFF, LAMP_ON, LEDS_OFF, LampSwitch, LedSwitch
 from labrig.foundation.models import FrozenModel
 
-from .scenes import Arrangement, Stage
+from .bench_configuration import BenchConfiguration, Stage
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -61,14 +61,14 @@ class ExcitingLights(FrozenModel):
         tuned = tuple(f"{wavelength_nm:g} nm" for wavelength_nm in self.monochromator)
         return self.filters or self.leds or tuned
 
-    def arrangement(self, name: str, stage: Stage = "sample") -> Arrangement:
-        """Return the arrangement of the bench for one light."""
+    def configuration(self, name: str, stage: Stage = "sample") -> BenchConfiguration:
+        """Return the configuration of the bench for one light."""
         if self.filters:
-            return Arrangement(stage, filter=name)
+            return BenchConfiguration(stage, filter=name)
         if self.monochromator:
             wavelength_nm = self.monochromator[self.names().index(name)]
-            return Arrangement(stage, monochromator_nm=wavelength_nm)
-        return Arrangement(stage)
+            return BenchConfiguration(stage, monochromator_nm=wavelength_nm)
+        return BenchConfiguration(stage)
 
     def on(self, name: str) -> LampSwitch | LedSwitch:
         """Return the action that switches the light on."""

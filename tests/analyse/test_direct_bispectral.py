@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part
+from labrig.analyse import AnalysisContext
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.material import read_reradiation
 from labrig.optics import SpectrometerReading, read_spectrometer_reading
-from labrig.process import process_and_report
 from labrig.protocols.direct_bispectral.analysis import analyse
 from labrig.protocols.direct_bispectral.protocol import DirectSpectra
 from labrig.protocols.direct_bispectral.result import DirectBispectralResult
@@ -25,7 +24,7 @@ from tests.analyse.direct_bench import (
     true_light,
     true_reflectance,
 )
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import DIRECT
 from tests.results.made import assert_read_back
 
@@ -119,7 +118,7 @@ def test_what_the_light_itself_covers_is_told_by_another_light_or_not_at_all(qui
 
 
 def test_the_files_are_read_back_and_the_report_says_what_it_is(quick: Path) -> None:
-    processed = process_and_report(quick)
+    processed = processed_once(quick)
     assert isinstance(processed.result, DirectBispectralResult)
     assert_read_back(processed.result)
     (columns,) = processed.result.samples.values()
@@ -143,11 +142,11 @@ def lit(attempt: Attempt) -> SpectrumRecord:
     return [one for one in attempt.spectra if one.role == DirectSpectra.LIT][-1]
 
 
-def changed(part: Part, change: dict[str, Any]) -> Part:
+def changed(context: AnalysisContext, change: dict[str, Any]) -> AnalysisContext:
     """A part some of whose units have other readings: by unit, the factor and the unit of more."""
-    attempts = {attempt.unit: attempt for attempt in part.run.attempts}
+    attempts = {attempt.unit: attempt for attempt in context.run.attempts}
     readings: dict[str, SpectrometerReading] = {}
-    folder = part.run.folder / "frames"
+    folder = context.run.folder / "frames"
     for unit, (factor, more) in change.items():
         spectrum = lit(attempts[unit])
         reading = read_spectrometer_reading(spectrum.path)
@@ -164,7 +163,7 @@ def changed(part: Part, change: dict[str, Any]) -> Part:
             counts = counts + part_of_it * (added.raw_counts - dark.raw_counts.mean(axis=0))
         readings[unit] = replace(reading, raw_counts=np.rint(counts))
     new = []
-    for attempt in part.run.attempts:
+    for attempt in context.run.attempts:
         if attempt.unit not in readings:
             new.append(attempt)
             continue
@@ -175,7 +174,7 @@ def changed(part: Part, change: dict[str, Any]) -> Part:
         made = replace(old, path=path, **_checks(data))
         spectra = [made if one is old else one for one in attempt.spectra]
         new.append(replace(attempt, spectra=spectra))
-    return replace(part, run=replace(part.run, attempts=new))
+    return replace(context, run=replace(context.run, attempts=new))
 
 
 def _checks(data: bytes) -> dict[str, Any]:

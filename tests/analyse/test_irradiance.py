@@ -13,12 +13,12 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
-from labrig.process import process_run
 from labrig.protocols.irradiance.analysis import in_bands, mean_ratio, strip_scale
 from labrig.protocols.irradiance.result import CardRatio, IrradianceResult
 from labrig.results.strip_profile import SliceValues
 from tests.analyse.lvf_calibration.room_truth import simulation_of, true_irradiance
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
+from tests.analyse.recorded import processed_once
 from tests.analyse.small_runs import irradiance
 from tests.results.made import assert_read_back
 
@@ -106,7 +106,7 @@ def test_rounds_are_averaged_and_their_scatter_is_reported() -> None:
 def test_on_the_simulated_bench_it_is_the_rooms(tmp_path: Path) -> None:
     """With a filter calibrated without error: what is left is the card's and the camera's."""
     run = irradiance(tmp_path)
-    result = process_run(run)
+    result = processed_once(run).result
     assert isinstance(result, IrradianceResult)
     file = result.calibration
     assert IRRADIANCE_KIND.read(run / "result" / "irradiance.yaml") == file

@@ -12,8 +12,13 @@ from labrig.analyse.series_fit import fit_series
 from labrig.bench import open_bench
 from labrig.foundation.errors import DataError
 from labrig.process import process_and_report
-from labrig.protocols.saturation.analysis import analyse, charge_level, charged, compare_rates
-from labrig.protocols.saturation.analysis.kinetic_order import compare_levels
+from labrig.protocols.saturation.analysis import (
+    analyse,
+    charge_level,
+    charged,
+    compare_levels,
+    compare_rates,
+)
 from labrig.protocols.saturation.result import Curve, PatchSaturation, SaturationResult
 from labrig.results import Measured, Series
 from tests.analyse.recorded import part_of

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
-from labrig.process import process_run
 from tests.analyse.excitation.bench import QUICK, true_irradiance
-from tests.analyse.recorded import record
+from tests.analyse.recorded import processed_once, record
 from tests.analyse.small_runs import RECORD
 from tests.analyse.spectral_bench import true_lvf_file
 
@@ -84,7 +83,7 @@ class Recorded:
         else:
             into.mkdir(exist_ok=True)
             run = self.record(into)
-        process_run(run)
+        processed_once(run)
         return run / "result"
 
     def keep_numbers(self, result: Path) -> None:

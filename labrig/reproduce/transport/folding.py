@@ -7,10 +7,10 @@ bands are found once, and a vertex takes one product instead of one for each ban
 it. The picture is that of `fold`, but for rounding.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,9 +132,12 @@ def fold(
         )  # fmt: skip
         return light
 
-    run: Callable[..., Any] = map
     if threads < 2:
-        return np.concatenate(list(run(part, paths)))
+        return np.concatenate([part(own) for own in paths])
+    paths = list(paths)
+    # A thread takes longer to start than a small part to fold.
+    if len(paths) < 2:
+        return np.concatenate([part(own) for own in paths])
     with ThreadPoolExecutor(threads, thread_name_prefix="fold") as pool:
         return np.concatenate(list(pool.map(part, paths)))
 
@@ -282,8 +285,8 @@ def colour_fold(
         )  # fmt: skip
         return light
 
-    run: Callable[..., Any] = map
-    if threads < 2:
-        return np.concatenate(list(run(part, range(len(paths)))))
+    # A thread takes longer to start than a small part to fold.
+    if threads < 2 or len(paths) < 2:
+        return np.concatenate([part(number) for number in range(len(paths))])
     with ThreadPoolExecutor(threads, thread_name_prefix="fold") as pool:
         return np.concatenate(list(pool.map(part, range(len(paths)))))

@@ -520,7 +520,7 @@ def _even(targets: int, per_target: int, dimensions: int, rng: np.random.Generat
 
 
 def _in_threads(part: Callable[[int], Paths], n_parts: int, threads: int) -> Iterator[Paths]:
-    if threads < 2:
+    if threads < 2 or n_parts < 2:
         yield from map(part, range(n_parts))
         return
     with ThreadPoolExecutor(threads, thread_name_prefix="paths") as pool:

@@ -13,13 +13,13 @@ import pytest
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import CAMERA_KIND, CameraFile
 from labrig.foundation.errors import DataError
-from labrig.process import Processed, process_and_report, process_run
+from labrig.process import Processed, process_run
 from labrig.protocols.camera_calibration.result import CameraCalibrationResult
 from labrig.protocols.decay import analysis as decay_analysis
 from labrig.record import read_run
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
-from tests.analyse.recorded import cut_off_and_resumed, part_of, record
+from tests.analyse.recorded import cut_off_and_resumed, part_of, processed_once, record
 from tests.analyse.small_runs import CAMERA_CALIBRATION, unlike_the_model
 from tests.results.made import assert_read_back
 
@@ -31,7 +31,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def processed(run: Path) -> Processed:
-    return process_and_report(run)
+    return processed_once(run)
 
 
 @pytest.fixture(scope="module")

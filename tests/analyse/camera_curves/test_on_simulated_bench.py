@@ -7,24 +7,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Overrides, Part
+from labrig.analyse import AnalysisContext, Overrides
 from labrig.bench_optics import camera_curves
 from labrig.fit.camera_curves import GRID_NM
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import CURVES_FILE, CameraResponse, read_camera
-from labrig.process import process_and_report
 from labrig.protocols.camera_curves.analysis import analyse
 from labrig.protocols.camera_curves.result import CameraCurvesResult
 from tests.analyse.chart_bench import record, true_curves, with_camera
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import UNKNOWN_CAMERA, curves_protocol
 from tests.fit.unknown_cameras import rms_of_curves
 from tests.results.made import assert_read_back
 
 
-def asked_anew(part: Part, **change: Any) -> Part:
+def asked_anew(context: AnalysisContext, **change: Any) -> AnalysisContext:
     """The run as if its protocol had said something else of what is made of it."""
-    return replace(part, protocol=part.protocol.model_copy(update=change))
+    return replace(context, protocol=context.protocol.model_copy(update=change))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +54,7 @@ def test_an_unknown_camera_is_told_by_its_chart(by_chart: CameraCurvesResult) ->
 
 
 def test_the_filter_halves_the_error(run: Path, by_chart: CameraCurvesResult) -> None:
-    done = process_and_report(run)
+    done = processed_once(run)
     assert isinstance(done.result, CameraCurvesResult)
     assert done.result.through_filter
     assert error_of(done.result, UNKNOWN_CAMERA) < 0.6 * error_of(by_chart, UNKNOWN_CAMERA)

@@ -7,24 +7,23 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Inputs, Part
+from labrig.analyse import AnalysisContext, Inputs
 from labrig.calibration import LVF_KIND
 from labrig.foundation.errors import UsageError
 from labrig.optics import CURVES_FILE
-from labrig.process import process_and_report
 from labrig.protocols.camera_curves.analysis import analyse as analyse_curves
 from labrig.protocols.colour_check.analysis import analyse
 from labrig.protocols.colour_check.result import ColourCheckResult
 from tests.analyse.chart_bench import record, with_camera
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera
 from tests.results.made import assert_read_back
 
 
-def with_optics(part: Part, **changed: str) -> Part:
+def with_optics(context: AnalysisContext, **changed: str) -> AnalysisContext:
     """The run as if its rig file had named other curves."""
-    optics = part.rig.optics.model_copy(update=changed)
-    return replace(part, rig=part.rig.model_copy(update={"optics": optics}))
+    optics = context.rig.optics.model_copy(update=changed)
+    return replace(context, rig=context.rig.model_copy(update={"optics": optics}))
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +32,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_colours_are_right_end_to_end(run: Path) -> None:
-    done = process_and_report(run)
+    done = processed_once(run)
     result = done.result
     assert isinstance(result, ColourCheckResult)
     assert result.plain.mean < 2

@@ -13,13 +13,13 @@ from labrig.calibration import FADE_KIND, Change, FadeFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.clock import Clock
 from labrig.foundation.errors import UsageError
-from labrig.process import Processed, process_and_report, process_run
+from labrig.process import Processed, process_run
 from labrig.protocols.fade.result import FadeResult
 from labrig.record import read_run
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.simulation import LampSettings
 from tests.acquire.fakes import Watching
-from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.analyse.recorded import cut_off_and_resumed, processed_once, record
 from tests.analyse.small_runs import FADE
 from tests.results.made import assert_read_back
 
@@ -34,7 +34,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def processed(run: Path) -> Processed:
-    return process_and_report(run)
+    return processed_once(run)
 
 
 @pytest.fixture(scope="module")

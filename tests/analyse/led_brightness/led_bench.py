@@ -8,7 +8,6 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.yaml_file import validate
-from labrig.process import process_run
 from labrig.protocols.led_brightness.analysis import analyse
 from labrig.protocols.led_brightness.result import LedBrightnessResult
 from labrig.record import read_run
@@ -18,7 +17,7 @@ from labrig.sim.leds import led_spectrum
 from labrig.sim.opening import PIXEL_STREAM
 from labrig.sim.simulation import Simulation
 from labrig.sim.spectrometer import Detector
-from tests.analyse.recorded import part_of, record, shipped_rig
+from tests.analyse.recorded import part_of, processed_once, record, shipped_rig
 
 QUICK = {"protocol": "led_brightness", "sample": {"name": "bank"}, "exposures": 1, "repeats": 1,
          "repetitions": 3, "integration": "0.2 s", "longest": "4 s"}  # fmt: skip
@@ -47,7 +46,7 @@ def result_of(run: Path) -> LedBrightnessResult:
 
 def processed(run: Path) -> LedBrightnessResult:
     """The result as it is written, read and shown."""
-    process_run(run)
+    processed_once(run)
     result = read_result(run)
     assert isinstance(result, LedBrightnessResult)
     return result

@@ -27,7 +27,7 @@ from labrig.protocols.led_fluorescence.analysis.methods import method_difference
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from labrig.results import FluorescentPatch
 from tests.analyse.led_bench import QUICK, SAMPLES, record
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.results.made import assert_read_back
 
 
@@ -44,7 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def processed(run: Path) -> Processed:
-    return process_and_report(run)
+    return processed_once(run)
 
 
 @pytest.fixture(scope="module")

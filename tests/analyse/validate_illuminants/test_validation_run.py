@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part
+from labrig.analyse import AnalysisContext
 from labrig.foundation.errors import DataError, UsageError
-from labrig.process import process_and_report
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from labrig.protocols.validate_illuminants.analysis import analyse
 from labrig.protocols.validate_illuminants.result import ValidateIlluminantsResult
 from labrig.reduce import find_colour_chart
 from labrig.results import RunResult, write_result
 from tests.analyse.led_bench import QUICK, SAMPLES, record
-from tests.analyse.recorded import part_of
+from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import VALIDATE_ONE
 from tests.results.made import assert_read_back
 
@@ -76,7 +75,7 @@ def test_a_lamp_that_the_camera_does_not_see_is_scaled_by_the_samples(
 
 
 def test_the_result_is_read_back_and_its_page_says_what_it_is(run: Path) -> None:
-    done = process_and_report(run)
+    done = processed_once(run)
     assert isinstance(done.result, ValidateIlluminantsResult)
     assert_read_back(done.result)
     *lines, budgets = done.lines
@@ -98,9 +97,9 @@ def _with_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:
     return change
 
 
-def asked_anew(part: Part, change: dict[str, Any]) -> Part:
+def asked_anew(context: AnalysisContext, change: dict[str, Any]) -> AnalysisContext:
     """The run as if its protocol had said something else of what is compared."""
-    return replace(part, protocol=part.protocol.model_copy(update=change))
+    return replace(context, protocol=context.protocol.model_copy(update=change))
 
 
 def test_another_matrix_differs_and_is_named(run: Path) -> None:
