@@ -187,7 +187,7 @@ class SwitchedLights(BoardDevice):
         return "; ".join(
             f"{board.identity()}, {self.noun} "
             + ", ".join(
-                f"{name} on {switch.place()}" if switch.place() else name
+                f"{name} on {switch.identity()}" if switch.place() else name
                 for name, switch in switches.items()
             )
             for board, switches in self._by_board()
