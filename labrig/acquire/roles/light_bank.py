@@ -140,7 +140,7 @@ class SwitchedLights(BoardDevice):
                     if (light.address or address) == port:
                         self._switches[name] = self.channel_class(board, light)
         except BaseException:  # what a crash left lit on other boards is not to stay so
-            with suppress(DeviceError):
+            with suppress(DeviceError), connections.clock.shielded():
                 self.make_safe()
             raise
         self._switches = {name: self._switches[name] for name in self._lights}
