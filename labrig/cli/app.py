@@ -24,7 +24,7 @@ from labrig.cli import (
     verify,
 )
 from labrig.cli.completion import complete_run
-from labrig.cli.process_command import ProcessCommand
+from labrig.cli.process import ProcessCommand
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",

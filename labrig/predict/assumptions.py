@@ -14,8 +14,8 @@ from labrig.foundation.quantity import TIME_S, parse
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import Material, read_material
 from labrig.optics import CameraResponse
-from labrig.predict.camera import TYPICAL_FLICKER, CameraFigures, typical_camera
 from labrig.predict.expectation import Bench, expected_schedule, predictable
+from labrig.predict.frames import TYPICAL_FLICKER, CameraFigures, typical_camera
 from labrig.predict.glow import Glow, check_states, laws, measured_amplitudes, radiated
 from labrig.predict.reference import Reference, read_reference, result_places, run_of
 from labrig.predict.variants import changed

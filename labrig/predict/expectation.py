@@ -17,8 +17,7 @@ from labrig.acquire import CameraOffers, ProtocolModel
 from labrig.fit import EPSILON
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import ProtocolError, UsageError
-from labrig.predict.camera import CameraFigures
-from labrig.predict.frames import dark_frames, glow_frames
+from labrig.predict.frames import CameraFigures, dark_frames, glow_frames
 from labrig.predict.glow import Glow
 from labrig.predict.series import DARK, FLICKER, ExpectedSeries, expected_series, repeated
 from labrig.protocols.steps.camera_settings import CameraSettings

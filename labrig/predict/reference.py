@@ -10,13 +10,13 @@ from labrig.acquire import read_protocol
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import read_yaml
-from labrig.predict.camera import (
+from labrig.predict.expectation import predictable
+from labrig.predict.frames import (
+    PEAK_SIGMAS,
     TYPICAL_DARK_ELECTRONS_PER_S,
     TYPICAL_ELECTRONS_PER_DN,
     CameraFigures,
 )
-from labrig.predict.expectation import predictable
-from labrig.predict.frames import PEAK_SIGMAS
 from labrig.record import FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import FrameMeasurement, NoiseModel, fit_dark, measure, read_raw, variance_terms
 from labrig.results import Series, find_fitted_decays, read_fitted_decay, read_series

@@ -53,14 +53,12 @@ from .run_folder import (
     RECORDING_LOCK as RECORDING_LOCK,
     RunFolder as RunFolder,
     RunLock as RunLock,
+    RunSize as RunSize,
+    size_text as size_text,
     time_made as time_made,
 )
 from .run_record import (
     Attempt as Attempt,
     RunRecord as RunRecord,
     read_run as read_run,
-)
-from .run_size import (
-    RunSize as RunSize,
-    size_text as size_text,
 )

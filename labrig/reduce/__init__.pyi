@@ -16,19 +16,24 @@ from .dark import (
     DarkModel as DarkModel,
     fit_dark as fit_dark,
 )
-from .decoding import (
-    Reduction as Reduction,
-)
 from .frame import (
     LinearFrame as LinearFrame,
     RegionSums as RegionSums,
     saturated_cells as saturated_cells,
+)
+from .frame_metadata import (
+    SensorLayout as SensorLayout,
+    frames_exif as frames_exif,
+    sensor_layout as sensor_layout,
 )
 from .frame_reduction import (
     Exposure as Exposure,
     StoredFrame as StoredFrame,
     reduce_frames as reduce_frames,
     reduce_groups as reduce_groups,
+)
+from .frame_workers import (
+    Reduction as Reduction,
 )
 from .glare import (
     FRAME_TILES as FRAME_TILES,
@@ -45,9 +50,6 @@ from .hot_pixels import (
     HotPixels as HotPixels,
     hot_pixels as hot_pixels,
     hot_pixels_of as hot_pixels_of,
-)
-from .kept_exif import (
-    frames_exif as frames_exif,
 )
 from .measured_frames import (
     SeriesFrame as SeriesFrame,
@@ -85,10 +87,6 @@ from .rounding import (
 )
 from .saturation import (
     is_clipped as is_clipped,
-)
-from .sensor_layout import (
-    SensorLayout as SensorLayout,
-    sensor_layout as sensor_layout,
 )
 from .series import (
     TWO_DEGREES as TWO_DEGREES,

@@ -14,12 +14,47 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
-from typing import IO, Any
+from typing import IO, Any, Protocol, TypeVar
 
 from labrig.foundation.errors import DataError
 from labrig.foundation.processors import n_processors
 from labrig.foundation.signals import name_of
-from labrig.reduce.decoding import Reduction
+from labrig.reduce.kept_reductions import encoded
+from labrig.reduce.raw import RawFrame, read_raw
+
+Reduced_co = TypeVar("Reduced_co", covariant=True)
+
+
+class Reduction(Protocol[Reduced_co]):
+    """A reduction of frames: a frozen dataclass that can be imported by its name.
+
+    Its fields are all that the outcome depends on besides the frames. They and the outcome, whose
+    type is annotated, are values as `labrig.reduce.kept_reductions` describes them.
+    """
+
+    def __call__(self, frames: Iterator[RawFrame], /) -> Reduced_co:
+        """Reduce frames; each is decoded when it is asked for."""
+
+
+def reduced_text(paths: Sequence[Path], reduction: Reduction[Any]) -> str:
+    """Decode frames and return what is made of them as text.
+
+    Raises
+    ------
+    DataError
+        A frame is damaged or cannot be reduced.
+    UsageError, DiskError
+        A frame cannot be read.
+    """
+    frames = (read_raw(path) for path in paths)
+    if len(paths) != 1:
+        return encoded(reduction(frames))
+    raw = next(frames)
+    try:
+        return encoded(reduction(iter((raw,))))
+    except DataError as error:
+        raise type(error)(f"{paths[0]}: {error}") from None
+
 
 #: Memory of this process and its workers together, and that of this process alone, in bytes.
 MEMORY_BYTES, OWN_BYTES = 1_000_000_000, 400_000_000

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import cv2
 
 from labrig.foundation.errors import LabrigError, memory_shortage
-from labrig.reduce.decoding import reduced_text
+from labrig.reduce.frame_workers import reduced_text
 
 _STDOUT, _STDERR = 1, 2
 

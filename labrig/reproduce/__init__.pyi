@@ -4,14 +4,12 @@ from .export.gltf import (
 from .export.mitsuba_scene import (
     write_mitsuba_scene as write_mitsuba_scene,
 )
-from .export.rgb_preview import (
-    RgbPreview as RgbPreview,
-    rgb_preview as rgb_preview,
-)
 from .export.scene_export import (
     ExportedMesh as ExportedMesh,
     Glow as Glow,
+    RgbPreview as RgbPreview,
     exported_meshes as exported_meshes,
+    rgb_preview as rgb_preview,
 )
 from .mesh_file.read_mesh import (
     read_mesh as read_mesh,

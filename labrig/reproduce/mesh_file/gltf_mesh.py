@@ -16,11 +16,12 @@ from labrig.reproduce.mesh_file.gltf_document import (
     GltfDocument,
     GltfMesh,
     GltfNeeds,
+    GltfNumbers,
     Node,
     Primitive,
     TextureInfo,
+    part_of,
 )
-from labrig.reproduce.mesh_file.gltf_numbers import GltfNumbers, part_of
 from labrig.reproduce.mesh_file.polygons import strip_triangles
 from labrig.reproduce.transport.mesh import Mesh
 
