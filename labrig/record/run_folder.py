@@ -1,4 +1,4 @@
-"""The run folder: protocol, rig, journal and frames; created once, then only appended to; its size."""
+"""The run folder: protocol, rig, journal and frames; created once, then only appended to."""
 
 import json
 import os
