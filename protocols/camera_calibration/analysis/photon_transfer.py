@@ -1,7 +1,7 @@
 """Gain and read noise of a sensor from pairs of frames of the same light.
 
 The variance is that of reading and that of photons, which rises with the light by the reciprocal of
-the gain, and bends with the sensor (module `bend`): gain and bend are fitted together. The
+the gain, and bends with the sensor (module `linearity`): gain and bend are fitted together. The
 difference of two frames holds no pattern of pixels, card or lens. Rounding is taken out as
 `labrig.reduce.rounding` and, where noise is less than a step of the converter's numbers, the module
 `read_noise` say.
