@@ -7,13 +7,11 @@ from typing import Protocol
 from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
 from labrig.foundation.errors import DeviceError, DeviceLostError
 
-from .eos.camera import EosCamera
 from .eos.codes import labelled_times_s as eos_times_s
 from .eos.protocol import lacking_operations
 from .opening import identify, open_link, open_session
 from .session import Session
 from .settings import PtpCameraSettings
-from .standard.camera import StandardCamera, missing_operations
 from .standard.exposure import labelled_times_s as standard_times_s
 
 
@@ -221,7 +219,11 @@ class PtpCamera:
     def _body_for(self, address: str, settings: PtpCameraSettings) -> Body:
         operations = self._info.operations
         if not (lacking := lacking_operations(operations)):
+            from .eos.camera import EosCamera  # a bench has a camera of one kind
+
             return EosCamera(self._session, self._clock, self._info, settings)
+        from .standard.camera import StandardCamera, missing_operations
+
         if not (missing := missing_operations(operations)):
             return StandardCamera(self._session, self._clock, self._info, settings)
         raise DeviceError(

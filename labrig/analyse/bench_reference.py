@@ -27,7 +27,7 @@ def reference_of(context: AnalysisContext, result: RunResult) -> ReferenceFile |
 
     Parameters
     ----------
-    part
+    context
         The run.
     result
         Its result.
