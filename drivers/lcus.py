@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from pydantic import Field
 
-from labrig.acquire import Connections, Finding
+from labrig.acquire import Board, Connections, Switch
 from labrig.foundation.errors import UnclearAnswerError
 from labrig.foundation.models import FrozenModel
 
@@ -26,78 +26,52 @@ MAX_RELAYS = 8
 _LINE = re.compile(rb"CH(\d+): *(ON|OFF) *\r\n")
 
 
-class LcusRelay:
-    """One relay of an LCUS board, switching a lamp.
+class LcusRelay(Switch):
+    """One relay of an LCUS board.
 
-    `on` and `off` return when the command has left the PC, without any sign that it was obeyed. A
-    board that answers the query is queried by `is_on` and `make_safe`, not by `on` and `off`: two
-    queries take a fifth of a second, in which a halogen lamp fades, and the time at which the lamp
-    was switched would be as uncertain.
-
-    Parameters
-    ----------
-    address
-        Serial port of the board; several relays may share it.
-    settings
-        The rig file's keys for this device.
-    connections
-        Connections that open the port.
+    It is switched when the command has left the PC, without any sign that it was obeyed. A board
+    that answers the query is queried by `is_on` and when it is made safe, not at each switching:
+    two queries take a fifth of a second, in which a halogen lamp fades, and the time at which the
+    light was switched would be as uncertain.
     """
 
     class Settings(FrozenModel):
-        """Keys of a relay of an LCUS board in a rig file.
+        """Keys of a relay of an LCUS board.
 
         Attributes
         ----------
         relay
-            Number of the relay that switches the lamp, as printed on the board: the first one is 1.
+            Number of the relay, as printed on the board: the first one is 1.
         """
 
         relay: int = Field(ge=1, le=MAX_RELAYS)
 
-    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
-        self._relay = settings.relay
-        self._name = f"the LCUS board at {address}"
-        self._clock = connections.clock
-        self._line = SerialLine(connections.serial(address, BAUDRATE), self._clock, self._name)
-        self._commanded_on = False
-        self._send(on=False)
-        self._answers = self._query() is not None
+    noun = "relay"
+    board: "Lcus"
+    settings: Settings
+
+    def __init__(self, board: "Lcus", settings: Settings) -> None:
+        super().__init__(board, settings)
+        self.switch(on=False)
+        if board.answers is None:
+            board.answers = board.query(settings.relay) is not None
+
+    def place(self) -> str:
+        """Return the number of the relay."""
+        return f"relay {self.settings.relay}"
 
     def reads_back(self) -> bool:
         """Return whether the board answers its query."""
-        return self._answers
+        return bool(self.board.answers)
 
-    def identity(self) -> str:
-        """Return the number of relays that the board reports, or that it never acknowledges."""
-        states = self._query() if self._answers else None
-        description = (
-            "never acknowledges: only the camera can verify it"
-            if states is None
-            else f"{len(states)} relays, read back by query"
-        )
-        return f"LCUS relay board ({description}), relay {self._relay}"
+    def command(self, *, on: bool) -> None:
+        """Send the command; return when it has left the PC."""
+        self.board.send(command(self.settings.relay, on=on))
 
-    def findings(self) -> Sequence[Finding]:
-        """Return whether anything but the camera can verify that the lamp was switched."""
-        if self._answers:
-            return [Finding("fine", "the board answers its query: its register is read back")]
-        return [
-            Finding(
-                "warn",
-                "this board never acknowledges: a relay that does not switch goes unnoticed here",
-                "see the lamp flash three times now; in a run only the camera can tell, so keep "
-                "photographs under the lamp and after it (protocol 'decay' takes them)",
-            )
-        ]
-
-    def on(self) -> None:
-        """Send the command to switch on; see the class about reading back."""
-        self._send(on=True)
-
-    def off(self) -> None:
-        """Send the command to switch off; see the class about reading back."""
-        self._send(on=False)
+    def switch(self, *, on: bool) -> None:
+        """Send the command; see the class about reading back."""
+        self.command(on=on)
+        self.state = on
 
     def is_on(self) -> bool:
         """Return the board's register, where it answers its query; else the last command.
@@ -105,43 +79,85 @@ class LcusRelay:
         A board that never acknowledges may have missed the command, or its contact may be welded.
         The register does not show the contact, either.
         """
-        return self._read() if self._answers else self._commanded_on
+        return self.board.are_on([self])[0]
 
-    def make_safe(self) -> None:
+
+class Lcus(Board):
+    """An LCUS board.
+
+    Parameters
+    ----------
+    address
+        Serial port of the board.
+    settings
+        Keys of the rig file.
+    connections
+        Connections that open the port.
+
+    Attributes
+    ----------
+    answers
+        Whether the board answers its query; None until its first relay has been switched off.
+    """
+
+    channels = (LcusRelay,)
+
+    def __init__(self, address: str, settings: Board.Settings, connections: Connections) -> None:
+        self.name = f"the LCUS board at {address}"
+        self._clock = connections.clock
+        self._line = SerialLine(connections.serial(address, BAUDRATE), self._clock, self.name)
+        self.answers: bool | None = None
+
+    def identity(self) -> str:
+        """Return the number of relays that the board reports, or that it never acknowledges."""
+        states = self.query(1) if self.answers else None
+        description = (
+            "never acknowledges: only the camera can verify it"
+            if states is None
+            else f"{len(states)} relays, read back by query"
+        )
+        return f"LCUS relay board ({description})"
+
+    def are_on(self, switches: Sequence[Switch]) -> list[bool]:
+        """Return the states of some relays by one query, else those commanded last."""
+        if not self.answers:
+            return [switch.state is not False for switch in switches]
+        relays = [switch.settings.relay for switch in switches]
+        states = self.query(max(relays))
+        if states is None:
+            raise UnclearAnswerError(
+                f"{self.name} answered its query before and does not within {LATEST_ANSWER_S:g} s "
+                "now; check its power and cable"
+            )
+        return [states[relay - 1] for relay in relays]
+
+    def make_safe(self, switches: Sequence[Switch]) -> None:
         """Switch off twice, as the second command ends one that was cut off; read back if possible.
 
         Raises
         ------
         UnclearAnswerError
-            The relay reads on, or the board has answered before and does not now.
+            A relay reads on, or the board has answered before and does not now.
         """
-        self._send(on=False)
-        self._send(on=False)
-        if self._answers and self._read():
-            raise UnclearAnswerError(
-                f"relay {self._relay} of {self._name} was switched off but reads on; switch off by "
-                "hand and check the board"
-            )
+        for switch in (*switches, *switches):
+            switch.switch(on=False)
+        for switch, is_on in zip(switches, self.are_on(switches), strict=True):
+            if is_on:
+                raise switch.contradicts(on=False)
 
-    def disconnect(self) -> None:
-        """Do nothing: the port belongs to the connections, which close it."""
-
-    def _send(self, *, on: bool) -> None:
-        self._line.write(command(self._relay, on=on))
-        self._commanded_on = on
+    def send(self, data: bytes) -> None:
+        """Send a command; return when it has left the PC."""
+        self._line.write(data)
         self._clock.sleep(COMMAND_S)
 
-    def _read(self) -> bool:
-        states = self._query()
-        if states is None:
-            raise UnclearAnswerError(
-                f"{self._name} answered its query before and does not within {LATEST_ANSWER_S:g} s "
-                "now; check its power and cable"
-            )
-        return states[self._relay - 1]
+    def query(self, relay: int) -> tuple[bool, ...] | None:
+        """Return the states of all relays; None without an answer. The first answer may be old.
 
-    def _query(self) -> tuple[bool, ...] | None:
-        """Return the states of all relays; None without an answer. The first answer may be old."""
+        Raises
+        ------
+        UnclearAnswerError
+            The answer is another board's, or the board has no such relay.
+        """
         self._line.drain()
         for _ in range(2):
             self._line.write(QUERY)
@@ -149,11 +165,11 @@ class LcusRelay:
         if not answer:
             return None
         states = relay_states(answer)
-        if len(states) < self._relay:
+        if len(states) < relay:
             raise UnclearAnswerError(
-                f"{self._name} was asked for relay {self._relay}: expected 'CH{self._relay}: ON' "
-                f"or 'OFF', or a byte for each relay, got {answer!r}; is it an LCUS board, and has "
-                "it that many relays?"
+                f"{self.name} was asked for relay {relay}: expected 'CH{relay}: ON' or 'OFF', or a "
+                f"byte for each relay, got {answer!r}; is it an LCUS board, and has it that many "
+                "relays?"
             )
         return states
 

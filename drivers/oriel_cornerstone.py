@@ -39,11 +39,6 @@ class OrielCornerstone:
     class Settings(MonochromatorBand):
         """Keys of an Oriel Cornerstone in a rig file."""
 
-    @classmethod
-    def declared_band(cls, settings: Settings) -> MonochromatorBand:
-        """Return what the rig file says of its band."""
-        return settings
-
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._settings = settings
         self._clock = connections.clock

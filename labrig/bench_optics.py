@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from labrig import material
-from labrig.acquire import RigFile, illuminant_lights, led_lights
+from labrig.acquire import ILLUMINANTS, LEDS, RigFile, bank_lights
 from labrig.calibration import CalibrationKind, LedsFile, LvfFile, kinds
 from labrig.foundation import resources
 from labrig.foundation.errors import UsageError
@@ -262,7 +262,7 @@ def led_exposures(
         The rig has no LEDs, nothing is known of the light of one, or the calibration is of other
         LEDs.
     """
-    lights = led_lights(rig, source)
+    lights = bank_lights(rig, LEDS.key, source)
     if not lights:
         raise UsageError(f"{source}: expected LEDs under 'devices', found none")
     calibrated = {} if calibration is None else calibration.leds
@@ -313,7 +313,7 @@ def illuminant_exposures(rig: RigFile, source: str) -> dict[str, LedExposure]:
         The rig has no bank of lamps, nothing is known of the light of one, or its filter is
         unknown.
     """
-    lamps = illuminant_lights(rig, source)
+    lamps = bank_lights(rig, ILLUMINANTS.key, source)
     if not lamps:
         raise UsageError(f"{source}: expected 'illuminants' under 'devices', found none")
     exposures = {}

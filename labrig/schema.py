@@ -6,14 +6,14 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from copy import copy
-from functools import reduce
+from functools import cache, reduce
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import SchemaError, SchemaSerializer, core_schema
 
-from labrig.acquire import ROLES, DeviceEntry, RigFile
+from labrig.acquire import ROLES, BoardDevice, DeviceEntry, RigFile
 from labrig.design import WishFile
 from labrig.foundation import plugins
 from labrig.foundation.errors import UsageError
@@ -67,13 +67,12 @@ def _rig() -> Any:
     """Return the model of a rig file whose devices have the keys of their drivers."""
     names = plugins.names(plugins.DRIVERS)
     drivers = {name: plugins.load(plugins.DRIVERS, name, "schema") for name in names}
-    entries = {name: _entry(name, driver.Settings) for name, driver in drivers.items()}
     roles: dict[str, Any] = {}
     for key, role in ROLES.items():
         fitting = [
-            entries[name]
+            _entry(name, fitted)  # type: ignore[arg-type]
             for name, driver in drivers.items()
-            if issubclass(driver, role.protocol_class)
+            if (fitted := role.driver(driver)) is not None
         ]
         if fitting:
             summary = inspect.cleandoc(role.protocol_class.__doc__ or "").splitlines()[0]
@@ -95,15 +94,19 @@ def _rig() -> Any:
     )
 
 
-def _entry(driver: str, settings: type[BaseModel]) -> type[BaseModel]:
-    """A device entry of one driver."""
+@cache
+def _entry(driver: str, fitted: type) -> type[BaseModel]:
+    """Return the model of a device's entry with that driver, as the class that fills its role."""
     texts = _descriptions(DeviceEntry)
     shared: dict[str, Any] = {}
     for name, field in DeviceEntry.model_fields.items():
         described = copy(field)
         described.description = texts[name]
         shared[name] = (Literal[driver] if name == "driver" else field.annotation, described)
-    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **shared)
+    # On a board, devices of different roles have different keys.
+    name = f"{driver} as {fitted.noun}" if issubclass(fitted, BoardDevice) else driver
+    settings: type[BaseModel] = fitted.Settings  # type: ignore[attr-defined]
+    return create_model(name, __base__=settings, __doc__=settings.__doc__, **shared)
 
 
 def _one_of(key: str, models: list[type[BaseModel]]) -> Any:

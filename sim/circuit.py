@@ -6,8 +6,7 @@ from labrig.foundation.clock import VirtualClock
 
 from .arrangement import LampKind
 from .faults import Fault, FaultTime, given
-from .lamp import Lamp
-from .mercury import Mercury
+from .lamp import Lamp, Mercury
 from .simulation import LampSettings
 
 

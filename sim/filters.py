@@ -1,4 +1,7 @@
-"""Colour filters before lamp and camera: curves from a folder, in truth a little different."""
+"""Colour filters before lamp and camera, in truth a little different; the monochromator's band.
+
+Filters are curves from a folder. The band is rounder than a triangle and has some stray light.
+"""
 
 import csv
 import zlib
@@ -16,7 +19,24 @@ from labrig.foundation.yaml_file import did_you_mean
 from .arrangement import USUAL_LAMP_M, Arrangement, Arrangements
 from .bench_settings import MonochromatorSettings
 from .lamp import IS_VISIBLE, WAVELENGTH_NM
-from .monochromator import passed_by
+
+#: Blaze of the grating and width of its efficiency in nm.
+BLAZE_NM, BLAZE_WIDTH_NM = 480.0, 260.0
+#: Equal slits give a triangle; lens errors round it by a normal curve of this part of its width.
+ROUNDED = 0.18
+
+
+def passed_by(settings: MonochromatorSettings, wavelength_nm: float) -> FloatArray:
+    """Return the transmittance where the monochromator is tuned to, shape (wavelengths,)."""
+    centre_nm = wavelength_nm + settings.off_nm
+    spread_nm = ROUNDED * settings.fwhm * np.linspace(-3, 3, 25)
+    weight = np.exp(-((spread_nm / (ROUNDED * settings.fwhm)) ** 2) / 2)
+    away = np.abs(WAVELENGTH_NM - centre_nm - spread_nm[:, None]) / settings.fwhm
+    band = weight @ np.clip(1 - away, 0.0, None) / weight.sum()
+    blaze = np.exp(-(((WAVELENGTH_NM - BLAZE_NM) / BLAZE_WIDTH_NM) ** 2))
+    passed: FloatArray = settings.level * blaze * (band + settings.stray)
+    return passed
+
 
 SHIPPED = "config/optics/filters"
 SUFFIX = ".csv"

@@ -27,9 +27,8 @@ from .boards import (
 from .boards.dc4100 import OUTPUTS
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
-from .clock import RoomClock
-from .disk import SimulatedDisk
 from .faults import Fault, FaultTime, given
+from .pc import RoomClock, SimulatedDisk
 from .room import Room
 from .simulation import Simulation
 from .spectrometer import Detector, SpectrometerBackend, UsbSpectrometer
@@ -41,10 +40,10 @@ from .temperature import TemperatureSensor
 #: `sim://room/lamps`, with a filter wheel `sim://room/wheel`, with one before the
 #: camera `sim://room/camera-wheel`, with a monochromator `sim://room/monochromator`.
 NAME = "room"
-#: Relay that carries the lamp, of any relay board; an LCUS board counts from 1.
-LAMP_RELAY = 0
+#: Relay that carries the lamp, the first one of its board, as the board counts.
+LAMP_RELAY = {"relays": 0, "arduino": 0, "lcus": 1}
 RELAYS = 8
-LCUS_RELAYS = 4
+LCUS_RELAYS = 8
 ARDUINO_RELAYS = 4
 DC4100_UNITS = 3
 #: Analogue input of the Numato board that has the thermometer.
@@ -76,7 +75,7 @@ class OpenRoom:
             {TEMPERATURE_INPUT: temperature.volts},
         )
         lcus = LcusBoard(
-            LCUS_RELAYS, lambda relay, on: self._relay_moved("lcus", relay - 1, on), simulation.lcus
+            LCUS_RELAYS, lambda relay, on: self._relay_moved("lcus", relay, on), simulation.lcus
         )
         arduino = ArduinoBoard(
             ARDUINO_RELAYS, lambda relay, on: self._relay_moved("arduino", relay, on), clock
@@ -90,7 +89,7 @@ class OpenRoom:
             "lcus": lcus,
             "arduino": arduino,
         }
-        relay_boards[self._lamp_board].states[LAMP_RELAY] = simulation.initial.lamp == "on"
+        relay_boards[self._lamp_board].states[0] = simulation.initial.lamp == "on"
         units = _dc4100_units(simulation, self.room)
         lamps = (
             {"lamps": NumatoBoard(RELAYS, self.room.switch_illuminant)}
@@ -101,7 +100,8 @@ class OpenRoom:
             if self._led_board == "dc4100":
                 units[f"dc4100-{1 + (relay - 1) // OUTPUTS}"].states[(relay - 1) % OUTPUTS] = True
             else:
-                relay_boards[self._led_board].states[relay] = True
+                first = LAMP_RELAY[self._led_board]
+                relay_boards[self._led_board].states[relay - first] = True
         selectors: dict[str, Fw102cBoard | CornerstoneBoard] = {}
         if simulation.filter_wheel is not None:
             selectors["wheel"] = Fw102cBoard(self.room.turn_wheel, clock)
@@ -168,7 +168,7 @@ class OpenRoom:
         return {"camera": self.camera.backend, "spectrometer": self.spectrometer}.get(device)
 
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
-        if (board, relay) == (self._lamp_board, LAMP_RELAY):
+        if (board, relay) == (self._lamp_board, LAMP_RELAY[self._lamp_board]):
             self.room.switch_lamp(on)
         elif board == self._led_board:
             self.room.switch_led(relay, on)

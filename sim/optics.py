@@ -1,4 +1,4 @@
-"""From light to photo-electrons: the simulated camera's own curves, aperture and lens.
+"""From light to photo-electrons: the simulated camera's curves, aperture and lens, and luminance.
 
 The curves are the shipped ones of a Canon EOS 5D Mark II, changed smoothly by as much as three
 laboratories disagree about that camera: labrig, which has the shipped ones, must tolerate it.
@@ -17,8 +17,9 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.material import Material
 
-from .lamp import CELL_NM, IS_VISIBLE, WAVELENGTH_NM
+from .lamp import BURNING_SPECTRUM, CELL_NM, IS_VISIBLE, WAVELENGTH_NM
 from .phosphor import band_cells
+from .simulation import LampSettings
 
 CURVES = "canon_eos_5d_mark_ii"
 CHANNELS = ("R", "G", "B")
@@ -182,3 +183,35 @@ def vignetting(height: int, width: int, focal_mm: float = FOCAL_MM) -> FloatArra
     tangent2 = corner**2 * (x**2 + y**2) / ((height / 2) ** 2 + (width / 2) ** 2)
     falloff: FloatArray = (1 + tangent2) ** -2
     return falloff
+
+
+#: Luminous efficacy of light of 540 THz in lm/W (SI, since 2019), and mcd in a cd.
+KM_LM_PER_W = 683.0
+MCD = 1000.0
+
+
+#: V(λ) of CIE 1924 from 380 nm to 780 nm in steps of 10 nm.
+STEPS_NM: FloatArray = np.arange(380.0, 781.0, 10.0)
+STEPS = (
+    3.9e-05, 0.00012, 0.000396, 0.00121, 0.004, 0.0116, 0.023, 0.038,
+    0.06, 0.09098, 0.13902, 0.20802, 0.323, 0.503, 0.71, 0.862,
+    0.954, 0.99495, 0.995, 0.952, 0.87, 0.757, 0.631, 0.503,
+    0.381, 0.265, 0.175, 0.107, 0.061, 0.032, 0.017, 0.00821,
+    0.004102, 0.002091, 0.001047, 0.00052, 0.0002492, 0.00012, 6e-05, 3e-05,
+    1.499e-05,
+)  # fmt: skip
+PHOTOPIC: FloatArray = np.nan_to_num(
+    PchipInterpolator(STEPS_NM, STEPS, extrapolate=False)(WAVELENGTH_NM)
+)
+
+
+def luminance_mcd_per_m2(radiance: FloatArray, lamp: LampSettings) -> FloatArray:
+    """Return the luminance of spectra (…, wavelengths) in the room's scale of radiance, (…).
+
+    In that scale a white surface under the lamp has `REFLECTED` times the irradiance; its
+    luminance is the illuminance over π.
+    """
+    seen = CELL_NM * KM_LM_PER_W * (radiance @ PHOTOPIC)
+    white = CELL_NM * KM_LM_PER_W * float(BURNING_SPECTRUM @ PHOTOPIC)
+    scale = lamp.illuminance / np.pi / (REFLECTED * lamp.irradiance * white)
+    return np.asarray(MCD * scale * seen)

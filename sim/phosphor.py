@@ -22,8 +22,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.material import Material, State
 
-from .kinetics import Law, Traps, depths_of, law_of, layers_of, rate_in_the_middle
-from .kinetics_settings import KineticsSettings
+from .kinetics import KineticsSettings, Law, Traps, depths_of, law_of, layers_of, rate_in_the_middle
 from .lamp import BURNING_K, CELL_EDGES_NM, CELL_NM, filament_spectrum
 from .traps import Drive, integrate
 

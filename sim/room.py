@@ -10,40 +10,36 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import UsageError
 
-from .aiming import (
-    LIVE_EXPOSURE_S,
-    LIVE_F_NUMBER,
-    developed,
-    live_stride,
-)
 from .arrangement import Arrangement, Arrangements
 from .bench_settings import FilterWheelSettings
 from .cards import reflectances
-from .changer import Changer
+from .changer import Changer, SampleHolder
 from .circuit import LampCircuit
 from .dng import Shot, encode_dng
-from .door import Door
-from .doors import Doors, Pulses, no_pulses
+from .door import Door, Doors, Pulses, no_pulses
 from .faults import FaultTime, given
 from .filters import Filters
-from .illuminants import Illuminants
-from .imaging import Imaging
+from .imaging import (
+    LIVE_EXPOSURE_S,
+    LIVE_F_NUMBER,
+    Imaging,
+    developed,
+    live_stride,
+)
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
-from .lamps import FilteredLamps
-from .led_circuit import LedCircuit
-from .leds import Leds
+from .lamps import FilteredLamps, Illuminants
+from .leds import LedCircuit, Leds
 from .lights import Lights, VisibleLight, leak, room_light_spectrum
-from .luminance import luminance_mcd_per_m2
 from .optics import (
     FOCAL_MM,
     CameraCurves,
     bent_curves,
     film,
     glass,
+    luminance_mcd_per_m2,
     measured_curves,
     vignetting,
 )
-from .sample_changer import SampleHolder
 from .sensor import (
     BAYER_RGGB,
     Course,
@@ -53,8 +49,8 @@ from .sensor import (
     gain_electrons_per_dn,
 )
 from .simulation import Simulation
-from .table import Table
 from .truth import Truth, true_lvf, true_patches
+from .view import Table
 from .wander import Ripple, Wander
 
 #: Rounding of times that were added up differently.

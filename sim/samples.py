@@ -12,9 +12,8 @@ from labrig.material import Albedo, Material, State, read_any_material
 
 from .arrangement import Arrangement, Arrangements
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
-from .layout import Layout
+from .layout import Layout, Lvf
 from .lights import Lights
-from .lvf import Lvf
 from .optics import CLOTH_REFLECTANCE, REFLECTED, emission
 from .phosphor import Light, Phosphor, phosphor
 from .simulation import EMPTY, Simulation

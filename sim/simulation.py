@@ -32,7 +32,7 @@ from .bench_settings import (
 from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
-from .kinetics_settings import KineticsSettings
+from .kinetics import KineticsSettings
 
 #: Largest number of a relay of the Numato board.
 RELAYS = 7
@@ -300,7 +300,7 @@ class Simulation(Part):
         Narrow-band LEDs beside the lamp.
     led_board
         Board that switches the LEDs: `relays`, the Numato board, or the Arduino if that switches
-        the lamp; or `dc4100`, Thorlabs units at `sim://room/dc4100-1` to `sim://room/dc4100-3`.
+        the lamp; `lcus`, the LCUS board; or `dc4100`, Thorlabs units at `sim://room/dc4100-1` to `sim://room/dc4100-3`.
     illuminants
         Broadband lamps, each on its relay of a Numato board of their own at `sim://room/lamps`.
     door
@@ -385,7 +385,7 @@ class Simulation(Part):
     faults: tuple[Fault, ...] = ()
     lamp: LampSettings = LampSettings()
     leds: tuple[LedSettings, ...] = ()
-    led_board: Literal["relays", "dc4100"] = "relays"
+    led_board: Literal["relays", "lcus", "dc4100"] = "relays"
     illuminants: tuple[IlluminantSettings, ...] = ()
     door: DoorSettings | None = None
     shield: DoorSettings | None = None
@@ -445,6 +445,8 @@ class Simulation(Part):
             raise ValueError("expected a relay of its own for each of 'illuminants'")
         if self.led_board == "relays" and any(led.relay > RELAYS for led in self.leds):
             raise ValueError(f"expected relays 1 to {RELAYS} for 'leds': the board has no more")
+        if self.led_board == self.lamp.board == "lcus" and 1 in leds:
+            raise ValueError("expected relays 2 to 8 for 'leds': relay 1 is the lamp's")
         if self.lvf is None and any(fault.lvf_turned for fault in self.faults):
             raise ValueError("a fault of the LVF needs an 'lvf:'")
         return self

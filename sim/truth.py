@@ -11,9 +11,8 @@ from labrig.foundation.output_file import write_text
 from labrig.material import Material
 
 from .bench_settings import StripSettings
-from .kinetics_settings import KineticsSettings
-from .layout import Layout
-from .lvf import Lvf, in_pixels
+from .kinetics import KineticsSettings
+from .layout import Layout, Lvf, in_pixels
 from .samples import Samples
 from .simulation import Simulation
 

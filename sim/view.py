@@ -1,16 +1,19 @@
 """The camera's view of the bench: glow, and light reflected by samples, cards, door, cloth."""
 
+from dataclasses import dataclass
+from typing import Self
+
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 
-from .angles import Angles
+from .angles import Angles, Spheres
 from .arrangement import Arrangement
 from .cards import brightened, reflectances
-from .layout import Layout, Places
+from .layout import Layout, Lvf, Places
 from .lights import VisibleLight
-from .lvf import Lvf
 from .optics import CLOTH_REFLECTANCE, REFLECTED
+from .samples import Samples
 from .sensor import BAYER_RGGB
 from .simulation import Simulation
 from .surfaces import Surfaces
@@ -177,3 +180,63 @@ class View:
         assert settings is not None
         assert self._lvf is not None
         return self._lvf.below(settings.on_sample, turned)
+
+
+@dataclass(frozen=True)
+class Table:
+    """The samples on the table, or on one place of the sample changer.
+
+    Attributes
+    ----------
+    simulation
+        Settings of the room with these samples.
+    layout
+        Layout of the picture.
+    samples
+        States of the samples.
+    surfaces
+        Surfaces of the samples.
+    view
+        The camera's view of them.
+    spheres
+        Shading of spheres; None if there are none.
+    """
+
+    simulation: Simulation
+    layout: Layout
+    samples: Samples
+    surfaces: Surfaces
+    view: View
+    spheres: Spheres | None
+
+    @classmethod
+    def of(cls, simulation: Simulation, place: int | None = None, leak: float = 0.0) -> Self:
+        """Return the table with the samples of a room.
+
+        Parameters
+        ----------
+        simulation
+            Settings of the room.
+        place
+            Place of the sample changer, from 1 on; 0 is the empty one, None: there is no changer.
+        leak
+            Light that reaches the samples while they are not in place, as a fraction.
+
+        Raises
+        ------
+        UsageError
+            A material does not exist or cannot glow, or a patch is outside the frame.
+        """
+        layout = Layout(simulation)
+        samples = Samples(simulation, layout, place, leak)
+        prompt = [patch.prompt for patch in simulation.patches]
+        surfaces = Surfaces(samples.materials, simulation.gloss, prompt)
+        has_sphere = any(patch.shape == "sphere" for patch in simulation.patches)
+        return cls(
+            simulation,
+            layout,
+            samples,
+            surfaces,
+            View(simulation, layout, surfaces),
+            Spheres(simulation) if has_sphere else None,
+        )

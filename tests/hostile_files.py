@@ -134,7 +134,7 @@ _addresses()
 
 @of("rig")
 def rig_whose_camera_is_far(stage: Stage) -> Path:
-    camera = {"driver": "ptp_camera", "address": f"ptpip://127.0.0.1:{stage.port}"}
+    camera = {"driver": "gphoto2_camera", "address": f"ptpip://127.0.0.1:{stage.port}"}
     return stage.file("rig.yaml", json.dumps({"name": "x", "devices": {"camera": camera}}))
 
 

@@ -22,7 +22,7 @@ from serial.tools import list_ports
 from serial.tools.list_ports_common import ListPortInfo
 
 from labrig.acquire import LAMP_OFF, LAMP_ON, ProtocolModel, Session, Unit
-from labrig.drivers.numato import NumatoRelay
+from labrig.drivers.numato import Numato
 from labrig.sim.boards import NumatoBoard
 from tests.quick_yaml import write_quickly
 
@@ -33,7 +33,7 @@ ENTRY_POINTS = """
 [labrig.measurements]
 hold = tests.hold_registration:HOLD
 [labrig.drivers]
-listed_relay = tests.lit_bench:ListedRelay
+listed_relay = tests.lit_bench:ListedBoard
 """
 #: Names the file with the serial ports that a PC has, for `listed_relay`.
 PORTS_FILE = "LABRIG_TEST_PORTS"
@@ -69,8 +69,8 @@ class HoldUnit:
         session.perform(LAMP_OFF)
 
 
-class ListedRelay(NumatoRelay):
-    """A Numato relay on a PC whose USB is what a file says: terminals are not on the USB."""
+class ListedBoard(Numato):
+    """A Numato board on a PC whose USB is what a file says: terminals are not on the USB."""
 
 
 def _listed_ports() -> list[ListPortInfo]:
@@ -244,7 +244,7 @@ class LitBench:
 
 @contextmanager
 def lit_bench(
-    folder: Path, board: BoardProcess, driver: str = "numato_relay", **protocol: Any
+    folder: Path, board: BoardProcess, driver: str = "numato", **protocol: Any
 ) -> Iterator[LitBench]:
     """All that a run of `hold` with that board needs, in `folder`."""
     info = folder / "path" / "hold-1.dist-info"

@@ -37,13 +37,13 @@ from tests.quick_yaml import read_quickly, write_quickly
 Make = Callable[..., Path]
 SERVO = "sim://room/servo"
 DEVICES = {
-    "lamp": {"driver": "lcus_relay", "address": "sim://room/lcus", "relay": 1},
+    "lamp": {"driver": "lcus", "address": "sim://room/lcus", "relay": 1},
     "shield": {
-        "driver": "maestro_shield", "address": SERVO, "channel": 1, "travel": "280 ms",
+        "driver": "maestro", "address": SERVO, "channel": 1, "travel": "280 ms",
         "covering": "1000 us", "uncovering": "2000 us",
     },
     "door": {
-        "driver": "maestro_door", "address": SERVO, "channel": 0, "travel": "280 ms",
+        "driver": "maestro", "address": SERVO, "channel": 0, "travel": "280 ms",
         "closed": "1000 us", "open": "2000 us",
     },
 }  # fmt: skip
@@ -132,7 +132,7 @@ def test_a_board_that_answers_is_fine(labrig: Callable[..., Ended], rig: Make) -
     report = json.loads(labrig("rig", "check", rig(lcus="text"), "--json").out)
     (lamp,) = [device for device in report["devices"] if device["key"] == "lamp"]
     assert [finding["severity"] for finding in lamp["findings"]] == ["fine"]
-    assert "4 relays" in lamp["identity"]
+    assert "8 relays" in lamp["identity"]
 
 
 def test_a_check_leaves_what_a_crash_left_behind_safe(
@@ -220,9 +220,9 @@ def test_the_watchdog_is_fed_between_frames(rig: Make, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("devices", "said"),
     [
-        ({"door": {"open": "1000 us"}}, "two different pulses"),
+        ({"door": {"open": "1000 us"}}, "two different positions"),
         ({"door": {"open": "5 ms"}}, "devices.door"),
-        ({"door": {"driver": "maestro_shield"}}, "the driver 'maestro_shield' is no door"),
+        ({"door": {"driver": "lcus"}}, "the driver 'lcus' is no door"),
         ({"lamp": {"relay": 0}}, "relay"),
     ],
 )

@@ -25,7 +25,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "labrig/foundation/exr_file.py",  # the null device, for what OpenEXR prints
             "labrig/bench/device_lock.py",  # locks of all users, not followed through links
             "labrig/acquire/running_programs.py",  # of the system: /proc
-            "labrig/cli/closed_pipe.py",  # the null device
+            "labrig/cli/exit_codes.py",  # the null device
             "labrig/bench/guard_process.py",  # the null device
             "labrig/reduce/worker_process.py",  # its own standard output
         },
@@ -49,7 +49,6 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "labrig/foundation/output_file.py",
             "labrig/record/run_folder.py",
             "labrig/record/checksums.py",
-            "labrig/record/run_lock.py",
             "labrig/process/run.py",
             "labrig/calibration/kept.py",
             "labrig/reproduce/compiled.py",
@@ -74,9 +73,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
         {"cv2.imwrite", "cv2.VideoWriter", "*.savefig", "PdfPages"},
         # Into memory.
         {
-            "labrig/report/picture_file.py",
             "labrig/report/figure_files.py",
-            "labrig/report/figures_pdf.py",
         },
     ),
     "parse YAML": (
@@ -121,11 +118,9 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
     ("socket",): {
         "labrig/bench/opening.py",  # by consent
         "labrig/bench/device_lock.py",
-        "labrig/record/run_lock.py",  # the name of this PC
+        "labrig/record/run_folder.py",  # the name of this PC
         "labrig/acquire/connections.py",  # the type
-        "drivers/ptp/ip/link.py",
         "sim/camera/ptpip/server.py",
-        "sim/camera/ptpip/connection.py",
     },
     (
         "urllib.request",

@@ -61,7 +61,7 @@ def test_what_is_shipped_is_valid_and_every_misspelt_key_is_not(
         ("protocol", {"charge": "platform"}),
         ("protocol", {"states": 4}),
         ("rig", {"devices": {"lamp": {"driver": "nobodys_relay", "address": "COM3"}}}),
-        ("rig", {"devices": {"lamp": {"driver": "numato_relay", "relay": 0}}}),
+        ("rig", {"devices": {"lamp": {"driver": "numato", "relay": 0}}}),
         ("rig", {"devices": {"lamp": {"driver": "ptp_camera", "address": "COM3"}}}),
         ("rig", {"simulation": {"sample": "blue-paint", "faults": ["lamp_daed"]}}),
         ("rig", {"simulation": {"sample": "blue-paint", "faults": [{"lamp_dead": {"at": 5}}]}}),
@@ -129,7 +129,9 @@ def test_keys_are_described_by_the_models_and_their_base_classes(
     assert "saturated" in protocols["Isotropy"]["properties"]["charge"]["description"]
     rig = validators["rig"].schema["$defs"]
     assert "rig check" in rig["ptp_camera"]["properties"]["shutter_lag"]["description"]
-    assert "until the device is steady" in rig["lcus_relay"]["properties"]["warm_up"]["description"]
+    assert (
+        "until the device is steady" in rig["lcus_as_lamp"]["properties"]["warm_up"]["description"]
+    )
     name, with_times = rig["Fault"]["anyOf"]
     assert "for ever" in name["description"]
     assert "bulb" in with_times["properties"]["lamp_dead"]["description"]

@@ -50,7 +50,8 @@ def _kind(block: dict[str, Any]) -> str | None:
     """Return the key that chooses a block with its value, such as `protocol: decay`."""
     for key in ("protocol", "driver"):
         if "const" in (value := block.get("properties", {}).get(key, {})):
-            return f"`{key}: {value['const']}`"
+            device = block.get("title", "").removeprefix(value["const"])
+            return f"`{key}: {value['const']}`{device if device.startswith(' as ') else ''}"
     return None
 
 

@@ -6,13 +6,12 @@ from contextlib import ExitStack
 from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
 from labrig.foundation.errors import DeviceError, DeviceLostError
 
-from .address import port_path
 from .checks import findings
 from .exposure import Exposure
 from .failures import BusyError, PerhapsReleasedError
 from .frames import Frames
 from .labels import labelled_times_s
-from .library import POLL_PERIOD_S, Library
+from .library import POLL_PERIOD_S, Library, port_path
 from .preparation import prepare
 from .process import require_gphoto2
 from .release import Release, release_of
@@ -66,11 +65,6 @@ class Gphoto2Camera:
             self._take_control()
             self._version = self._library.version()
             self._leaving = leaving.pop_all()
-
-    @classmethod
-    def declared_offers(cls, settings: Gphoto2CameraSettings) -> CameraOffers:
-        """Return the offers that planning without the camera assumes."""
-        return settings.declared_offers()
 
     @classmethod
     def recorded_exposures_s(cls, label_s: float, identity: str) -> tuple[float, ...]:

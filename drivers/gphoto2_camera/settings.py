@@ -69,7 +69,7 @@ class Gphoto2CameraSettings(FrozenModel):
         """Return whether `exposure_s` seconds are within `longest_exposure`."""
         return exposure_s <= self.longest_exposure * 1.0001
 
-    def declared_offers(self) -> CameraOffers:
+    def planned_offers(self) -> CameraOffers:
         """Return the offers assumed without the camera: shutter times in thirds of a stop."""
         times_s = (2.0 ** (n / 3) for n in range(_SHORTEST_THIRDS, _LONGEST_THIRDS + 1))
         return self.offers(filter(self.allows_exposure, times_s), self.isos, self.f_numbers)

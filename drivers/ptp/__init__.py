@@ -1,4 +1,4 @@
-"""Cameras over PTP, on USB or in the network (PTP/IP): Canon EOS, and cameras on standard PTP."""
+"""Cameras over PTP on USB: Canon EOS, and cameras on standard PTP."""
 
 from .camera import PtpCamera
 

@@ -1,20 +1,57 @@
-"""A PTP camera on USB or in the network as labrig's camera."""
+"""A PTP camera on USB as labrig's camera."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
+from typing import Protocol
 
 from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
 from labrig.foundation.errors import DeviceError, DeviceLostError
 
-from .body import Body
 from .eos.camera import EosCamera
 from .eos.codes import labelled_times_s as eos_times_s
 from .eos.protocol import lacking_operations
 from .opening import identify, open_link, open_session
 from .session import Session
 from .settings import PtpCameraSettings
-from .standard.camera import NEEDED, StandardCamera
+from .standard.camera import StandardCamera, missing_operations
 from .standard.exposure import labelled_times_s as standard_times_s
+
+
+class Body(Protocol):
+    """One kind of camera; methods that are not described here are those of the roles."""
+
+    def take_control(self) -> None:
+        """Apply the settings that control by a PC needs, and read them back."""
+
+    def take_over(self) -> None:
+        """Take control where a dead program, or a reset, left the camera in an unknown state."""
+
+    def give_back(self) -> None:
+        """Give the camera back to its own buttons."""
+
+    def offers(self) -> CameraOffers:
+        """Return the exposure settings that the camera offers now."""
+
+    def findings(self) -> Sequence[Finding]:
+        """Return findings on the camera's manual settings, as far as it reports them."""
+
+    def keep_awake(self) -> None:
+        """Postpone the camera's automatic switching-off."""
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        """Apply exposure settings and read them back."""
+
+    def arm(self) -> None:
+        """Do all that can be done before the release."""
+
+    def shoot(self) -> Frame:
+        """Release now, wait for the exposure, transfer the frame."""
+
+    def preview(self) -> bytes:
+        """Return one live picture, a JPEG."""
+
+    def steps_to_safety(self) -> Sequence[Callable[[], None]]:
+        """Return the steps that make the camera safe, all of which are tried in this order."""
 
 
 class PtpCamera:
@@ -23,12 +60,11 @@ class PtpCamera:
     Parameters
     ----------
     address
-        Address of the camera, `usb://vid:pid[/serial]`, `ptpip://host[:port]` or
-        `sim://room/device`.
+        Address of the camera, `usb://vid:pid[/serial]` or `sim://room/device`.
     settings
         The rig file's keys for this camera.
     connections
-        Connections that open the USB device or the network connection, and have the clock.
+        Connections that open the USB device, and have the clock.
 
     Raises
     ------
@@ -55,11 +91,6 @@ class PtpCamera:
                 self._body.take_control()
             self._in_control = True
             self._leaving = leaving.pop_all()
-
-    @classmethod
-    def declared_offers(cls, settings: PtpCameraSettings) -> CameraOffers:
-        """Return the offers that planning without the camera assumes."""
-        return settings.declared_offers()
 
     @classmethod
     def recorded_exposures_s(cls, label_s: float, identity: str) -> tuple[float, ...]:
@@ -191,13 +222,12 @@ class PtpCamera:
         operations = self._info.operations
         if not (lacking := lacking_operations(operations)):
             return EosCamera(self._session, self._clock, self._info, settings)
-        if operations >= NEEDED:
+        if not (missing := missing_operations(operations)):
             return StandardCamera(self._session, self._clock, self._info, settings)
         raise DeviceError(
             f"camera {address}: expected a Canon EOS with remote release or a camera with "
             f"InitiateCapture, got {self._info} without {', '.join(lacking)}, and without "
-            f"{', '.join(f'0x{op:X}' for op in sorted(NEEDED - operations))}: set its USB mode to "
-            "PC remote, or use a camera that has them"
+            f"{', '.join(missing)}: set its USB mode to PC remote, or use a camera that has them"
         )
 
     def _give_back(self) -> None:

@@ -1,7 +1,6 @@
 """Opening of the camera at a rig file's address."""
 
 from typing import Any
-from urllib.parse import urlsplit
 
 from labrig.acquire import Connections
 from labrig.foundation.clock import Clock
@@ -9,14 +8,12 @@ from labrig.foundation.errors import DeviceError
 
 from .codes import Standard
 from .device_info import DeviceInfo, parse_device_info
-from .ip.link import PORT, IpLink
-from .link import Link
 from .session import Session
 from .usb.link import UsbLink
 
 
-def open_link(address: str, connections: Connections) -> Link:
-    """Return the link to the camera at `ptpip://host[:port]`, or at an address of a USB device.
+def open_link(address: str, connections: Connections) -> UsbLink:
+    """Return the link to the camera at an address of a USB device.
 
     Raises
     ------
@@ -24,8 +21,6 @@ def open_link(address: str, connections: Connections) -> Link:
         No camera is at the address, or another program holds it.
     """
     clock = connections.clock
-    if urlsplit(address).scheme == "ptpip":
-        return IpLink(lambda: connections.tcp(address, PORT), address, clock)
     device = connections.usb(address, lambda twin: _serial_number(twin, address, clock))
     return UsbLink(device, address, clock)
 

@@ -4,6 +4,7 @@ import logging
 import struct
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Protocol
 
 from labrig.foundation.clock import Clock
 from labrig.foundation.errors import DeviceError
@@ -19,7 +20,6 @@ from .codes import (
 )
 from .containers import Container, Kind, command, encode
 from .failures import MalformedError, RefusedError
-from .link import Link
 
 SESSION_ID = 1
 LAST_TRANSACTION_ID = 0xFFFFFFFE
@@ -36,6 +36,28 @@ MAX_ANSWER_BYTES = 4 * 1024 * 1024
 NO_CARD = "no card is in it, and some cameras stay busy without: put one in, and leave its menus"
 
 _logger = logging.getLogger(__name__)
+
+
+class Link(Protocol):
+    """Containers to and from one camera; every failure is a `DeviceError`."""
+
+    def send(self, request: Container, data: bytes | None, doing: str) -> None:
+        """Send a command, and its data if it has some; `doing` is its purpose in messages."""
+
+    def receive(self, doing: str, timeout_s: float, at_most_bytes: int) -> Container:
+        """Return the next container of limited length, within `timeout_s` for each packet."""
+
+    def event(self, timeout_s: float) -> Container | None:
+        """Return the next event, None if the camera reports none within `timeout_s`."""
+
+    def cancel(self, transaction_id: int) -> None:
+        """Make the camera cancel a transaction and discard what it still sends."""
+
+    def reset(self) -> None:
+        """Reset the camera's PTP side; its session is closed."""
+
+    def close(self) -> None:
+        """Close the connection with the camera; never raises."""
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ class PtpCameraSettings(FrozenModel):
             return NativeIsos(self.isos, "rig file")
         return isos_of_model(model)
 
-    def declared_offers(self) -> CameraOffers:
+    def planned_offers(self) -> CameraOffers:
         """Return the expected offers of a camera with these settings, in thirds of a stop."""
         times_s = (shutter_time_s(code) for code in third_stop_codes())
         return CameraOffers(

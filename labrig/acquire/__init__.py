@@ -2,25 +2,32 @@
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
-from labrig.acquire.calibration_rules import CalibrationRules
+from labrig.acquire.channels import (
+    Board,
+    Channel,
+    Positions,
+    Servo,
+    Switch,
+    TemperatureSensor,
+)
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.loading import (
+    bank_lights,
     changes_with_absolute_paths,
     driver_and_settings,
-    illuminant_lights,
-    led_lights,
     load_driver,
     read_protocol,
 )
-from labrig.acquire.luminance_reading import LampType, LuminanceReading
-from labrig.acquire.plan import Plan, Step
-from labrig.acquire.planner import MAX_STEPS, plan, planned_rig
+from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.rig import Rig, in_safe_order
 from labrig.acquire.rig_file import (
+    CalibrationRules,
     DeviceEntry,
+    LampType,
+    LuminanceReading,
     Optics,
     RigFile,
     read_rig_file,
@@ -46,8 +53,10 @@ __all__ = [
     "SERVICES",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
+    "Board",
     "CalibrationRules",
     "CameraOffers",
+    "Channel",
     "Connections",
     "DeviceEntry",
     "ExposureSettings",
@@ -61,6 +70,7 @@ __all__ = [
     "Optics",
     "PartUnit",
     "Plan",
+    "Positions",
     "Program",
     "ProtocolModel",
     "Rig",
@@ -68,20 +78,22 @@ __all__ = [
     "RunObserver",
     "Sample",
     "SerialPort",
+    "Servo",
     "Session",
     "Severity",
     "Step",
+    "Switch",
+    "TemperatureSensor",
     "TimedAction",
     "UndoManualStep",
     "Unit",
     "at",
+    "bank_lights",
     "changes_with_absolute_paths",
     "driver_and_settings",
     "frame_bytes",
     "gone",
-    "illuminant_lights",
     "in_safe_order",
-    "led_lights",
     "lights_that_read_back",
     "linux_programs",
     "load_driver",

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.rig_file import RigFile
-from labrig.acquire.roles import ILLUMINANTS, LEDS, ROLES, Illuminant, LedLight
+from labrig.acquire.roles import ROLES
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import with_absolute_paths
 from labrig.foundation.plugins import DRIVERS, MEASUREMENTS, load, measurement, names
@@ -24,14 +24,15 @@ def load_driver(key: str, name: str, source: str) -> Any:
     key
         Key of the device in the rig file, such as `lamp`.
     name
-        Name under which the driver is registered, such as `numato_relay`.
+        Name under which the driver is registered, such as `numato`.
     source
         Name or path of the rig file, for messages.
 
     Returns
     -------
     type
-        Class of the driver; it satisfies the Protocol of the role `key`.
+        Class that satisfies the Protocol of the role `key`: the driver itself, or the role on
+        channels of the driver's board.
 
     Raises
     ------
@@ -41,11 +42,12 @@ def load_driver(key: str, name: str, source: str) -> Any:
     Examples
     --------
     >>> from labrig.acquire import load_driver
-    >>> load_driver("lamp", "numato_relay", "rig.yaml").__name__
-    'NumatoRelay'
+    >>> load_driver("lamp", "numato", "rig.yaml").__name__
+    'NumatoSwitchedLamp'
     """
-    driver, role = load(DRIVERS, name, source), ROLES[key]
-    if not issubclass(driver, role.protocol_class):
+    role = ROLES[key]
+    driver = role.driver(load(DRIVERS, name, source))
+    if driver is None:
         raise UsageError(
             f"{source}: the driver '{name}' is no {role.name}; choose another driver for "
             f"'devices.{key}'"
@@ -86,85 +88,50 @@ def driver_and_settings(rig: RigFile, key: str, source: str) -> tuple[Any, Any]:
     >>> rig = labrig.read_rig_file(resources.find("config", "rig", "sim-arduino"))
     >>> driver, settings = driver_and_settings(rig, "leds", "sim-arduino")
     >>> driver.__name__, list(settings.channels)
-    ('SerialLedBank', ['450 nm', '525 nm'])
+    ('SerialRelaySwitchedLeds', ['450 nm', '525 nm'])
     """
     entry = rig.devices[key]
     driver = load_driver(key, entry.driver, source)
     return driver, validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
 
 
-def led_lights(rig: RigFile, source: str) -> dict[str, LedLight]:
-    """Return what a rig file says of the light of its LEDs, without opening any device.
+def bank_lights(rig: RigFile, key: str, source: str) -> dict[str, Any]:
+    """Return what a rig file says of the light of a bank, without opening any device.
 
     Parameters
     ----------
     rig
         Rig file with the devices.
+    key
+        Key of the bank in the rig file: `leds` or `illuminants`.
     source
         Name or path of the rig file, for messages.
 
     Returns
     -------
-    dict of str to LedLight
-        Spectrum and settling time of each LED by its name, in the rig file's order; empty if the
-        rig has no LEDs.
+    dict of str to LedLight or Illuminant
+        Spectrum and settling time of each light by its name, in the rig file's order, with the
+        filter of a lamp; empty if the rig has no such bank.
 
     Raises
     ------
     UsageError
-        If there is no such driver, or a key of the LEDs is unknown or invalid.
+        If there is no such driver, or a key of the lights is unknown or invalid.
 
     Examples
     --------
     >>> import labrig
     >>> from labrig.foundation import resources
-    >>> from labrig.acquire import led_lights
+    >>> from labrig.acquire import bank_lights
     >>> path = resources.find("config", "rig", "sim-arduino")
-    >>> lights = led_lights(labrig.read_rig_file(path), "sim-arduino")
+    >>> lights = bank_lights(labrig.read_rig_file(path), "leds", "sim-arduino")
     >>> [(name, light.peak_nm()) for name, light in lights.items()]
     [('450 nm', 450.0), ('525 nm', 525.0)]
     """
-    if LEDS.key not in rig.devices:
+    if key not in rig.devices:
         return {}
-    driver, settings = driver_and_settings(rig, LEDS.key, source)
-    return dict(driver.declared_leds(settings))
-
-
-def illuminant_lights(rig: RigFile, source: str) -> dict[str, Illuminant]:
-    """Return what a rig file says of the light of its bank of lamps, without opening any device.
-
-    Parameters
-    ----------
-    rig
-        Rig file with the devices.
-    source
-        Name or path of the rig file, for messages.
-
-    Returns
-    -------
-    dict of str to Illuminant
-        Spectrum, filter and settling time of each lamp by its name, in the rig file's order; empty
-        if the rig has no such bank.
-
-    Raises
-    ------
-    UsageError
-        If there is no such driver, or a key of the lamps is unknown or invalid.
-
-    Examples
-    --------
-    >>> import labrig
-    >>> from labrig.foundation import resources
-    >>> from labrig.acquire import illuminant_lights
-    >>> path = resources.find("config", "rig", "sim-fluorescent")
-    >>> lamps = illuminant_lights(labrig.read_rig_file(path), "sim-fluorescent")
-    >>> [(name, lamp.settling) for name, lamp in lamps.items()][:2]
-    [('daylight', 600.0), ('halogen', 600.0)]
-    """
-    if ILLUMINANTS.key not in rig.devices:
-        return {}
-    driver, settings = driver_and_settings(rig, ILLUMINANTS.key, source)
-    return dict(driver.declared_lamps(settings))
+    _, settings = driver_and_settings(rig, key, source)
+    return dict(settings.channels)
 
 
 def read_protocol(

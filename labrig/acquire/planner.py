@@ -1,16 +1,15 @@
-"""The plan: the protocol's own code run on stand-ins that take the time of the devices."""
+"""The plan of a run: the protocol's own code run on stand-ins that take the time of the devices."""
 
+import json
 import math
 import zlib
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
-from labrig.acquire.frame_regions import require_inside
 from labrig.acquire.loading import driver_and_settings
-from labrig.acquire.plan import Plan, Step
-from labrig.acquire.protocol import ProtocolModel
+from labrig.acquire.protocol import ProtocolModel, require_inside
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import CAMERA, ROLES, Device
@@ -21,7 +20,114 @@ from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
-from labrig.record import ActionRecord, FrameRecord, SpectrumRecord
+from labrig.record import PERSON, ActionRecord, FrameRecord, RunSize, SpectrumRecord
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the timeline.
+
+    Attributes
+    ----------
+    at_s
+        Begin of the step in seconds after the start of the run.
+    unit
+        Name of the unit.
+    device
+        Key of the device, `PERSON` for a step by hand, `-` for a wait or a warning.
+    action
+        Action as text.
+    exposure_s
+        Shutter time of a photograph in seconds; None for all other steps.
+    lasts_s
+        Duration of a wait in seconds; None for all other steps.
+    """
+
+    at_s: float
+    unit: str
+    device: str
+    action: str
+    exposure_s: float | None = None
+    lasts_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Timeline of a run, with the longest durations and the largest number of frames.
+
+    Attributes
+    ----------
+    steps
+        Steps in order of time.
+    units
+        Names of the units in order.
+    unit_ends_s
+        End of each unit in seconds after the start of the run.
+    offers
+        Settings that the camera offers.
+    patches
+        Largest number of patches of a unit.
+    """
+
+    steps: tuple[Step, ...]
+    units: tuple[str, ...]
+    unit_ends_s: tuple[float, ...]
+    offers: CameraOffers
+    patches: int = 1
+
+    @property
+    def duration_s(self) -> float:
+        """Lab time of the whole run in seconds."""
+        return self.unit_ends_s[-1] if self.unit_ends_s else 0.0
+
+    @property
+    def frames(self) -> int:
+        """Number of frames."""
+        return self.size().frames
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of frames and results on disk in bytes."""
+        return self.size().total_bytes
+
+    def size(self, done: Collection[str] = ()) -> RunSize:
+        """Return the size on disk to be expected of the units that are not done yet."""
+        frames = sum(step.device == CAMERA.key and step.unit not in done for step in self.steps)
+        return RunSize.expected(frames, self.offers.frame_bytes, self.patches)
+
+    @property
+    def manual_steps(self) -> tuple[str, ...]:
+        """Steps to be done by hand."""
+        return tuple(step.action for step in self.steps if step.device == PERSON)
+
+    def lines(self) -> list[str]:
+        """Return the timeline as lines `@t (+dt) device action`, with a heading for each unit."""
+        lines, unit, before_s = [], "", 0.0
+        for step in self.steps:
+            if step.unit != unit:
+                unit = step.unit
+                lines.append(f"unit {unit}")
+            lines.append(
+                f"  @{step.at_s:10.3f} s (+{step.at_s - before_s:9.3f} s)  "
+                f"{step.device:8} {step.action}"
+            )
+            before_s = step.at_s
+        return lines
+
+    def to_json(self) -> str:
+        """Return the timeline as JSON."""
+        size = self.size()
+        content = {
+            "units": self.units,
+            "duration_s": self.duration_s,
+            "manual_steps": len(self.manual_steps),
+            "frames": size.frames,
+            "frames_bytes": size.frames_bytes,
+            "size_bytes": size.total_bytes,
+            "steps": [asdict(step) for step in self.steps],
+        }
+        return json.dumps(content, ensure_ascii=False)
+
 
 #: Largest number of steps: more than any run has, and laid out in about a second.
 MAX_STEPS = 50_000
@@ -74,7 +180,7 @@ def plan(
     bench = planned_rig(rig, source)
     clock = bench.clock
     assert isinstance(clock, VirtualClock)
-    protocol = protocol.suited_to(rig)
+    protocol = protocol.resolved_for(rig)
     if offers is not None:
         bench.devices[CAMERA.key] = PlannedCamera(clock, offers)
     offers = bench[CAMERA].offers() if CAMERA in bench else CameraOffers((), ())
@@ -131,9 +237,9 @@ def planned_rig(rig: RigFile, source: str, keys: Collection[str] | None = None) 
     for key in rig.devices:
         if keys is not None and key not in keys:
             continue
-        driver, settings = driver_and_settings(rig, key, source)
+        _, settings = driver_and_settings(rig, key, source)
         if stand_in := ROLES[key].planned:
-            devices[key] = stand_in(driver, settings, clock)
+            devices[key] = stand_in(settings, clock)
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
     return Rig(rig.name, clock, devices, warm_up_s)
 
@@ -192,8 +298,8 @@ class _PlanRecorder:
     def all_actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self.done if action.device == device]
 
-    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
-        return worst
+    def decide(self, name: str, on_bench: Callable[[], T], when_planned: T) -> T:
+        return when_planned
 
     def seed(self) -> int:
         return zlib.crc32(self.unit.encode())

@@ -1,21 +1,72 @@
-"""Base of all protocols: a YAML file as a frozen model that lists its units."""
+"""Base of all protocols: a YAML file as a frozen model that lists its units and regions."""
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Protocol, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from labrig.acquire.frame_regions import regions_in
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.acquire.values import CameraOffers
 from labrig.calibration import CalibrationKind
+from labrig.foundation.errors import ProtocolError, UsageError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import LengthMm, MassPerArea
-from labrig.foundation.region import Region
+from labrig.foundation.region import LEAST_PIXELS, IsRegion, Region, region_pixels
 from labrig.record import FrameRole, unit_in
+
+
+def regions_in(model: BaseModel) -> dict[str, Region]:
+    """Return the regions among the values of a model by their keys, such as `patches.sample`."""
+    regions: dict[str, Region] = {}
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if value is None or not _names_regions((field.annotation, *field.metadata)):
+            continue
+        if isinstance(value, Mapping):
+            regions |= {f"{name}.{patch}": region for patch, region in value.items()}
+        else:
+            regions[name] = value
+    return regions
+
+
+def _names_regions(annotation: tuple[Any, ...]) -> bool:
+    """Return whether a type is a region or holds some; an annotated one has its metadata behind."""
+    return any(
+        isinstance(part, IsRegion) or _names_regions(get_args(part))
+        for part in annotation
+        if part is not None
+    )
+
+
+def require_inside(regions: Mapping[str, Region], frame_pixels: tuple[int, int]) -> None:
+    """Refuse regions that extend beyond a frame, or have too few pixels to estimate their noise.
+
+    Parameters
+    ----------
+    regions
+        Regions by their keys in the protocol.
+    frame_pixels
+        Width and height of the camera's frames in pixels.
+
+    Raises
+    ------
+    ProtocolError
+        A region is not inside, or too small; the message names its key and the frame's size.
+    """
+    for key, region in regions.items():
+        try:
+            _, _, width, height = region_pixels(region, *frame_pixels)
+        except UsageError as error:
+            raise ProtocolError(f"{key}: {error}") from None
+        if width * height < LEAST_PIXELS:
+            raise ProtocolError(
+                f"{key}: expected a region of at least {LEAST_PIXELS} pixels, got {width} × "
+                f"{height} of a frame of {frame_pixels[0]} × {frame_pixels[1]}; from fewer the "
+                "noise cannot be estimated"
+            )
 
 
 class Unit(Protocol):
@@ -77,7 +128,7 @@ class ProtocolModel(FrozenModel):
     """
 
     #: Kinds of calibrations on which the results depend.
-    rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
+    requires: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
     #: Whether calibrations that are kept beside the runs are used; not by what measures them anew.
     uses_calibrations: ClassVar[bool] = True
 
@@ -120,7 +171,7 @@ class ProtocolModel(FrozenModel):
         """Return all regions of the frame that the protocol names, by their keys."""
         return regions_in(self)
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the protocol with the values that it takes from the rig file; the base takes none.
 
         Raises
@@ -140,7 +191,7 @@ class ProtocolModel(FrozenModel):
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols whose results this one needs and the rig file does not name."""
-        return [kind.protocol for kind in self.rests_on if rig.optics.named(kind) is None]
+        return [kind.protocol for kind in self.requires if rig.optics.named(kind) is None]
 
 
 @dataclass(frozen=True)

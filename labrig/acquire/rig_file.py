@@ -1,13 +1,13 @@
 """The rig file: driver, address and warm-up time of each device, and the optics of the bench."""
 
+import re
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model, model_validator
 
-from labrig.acquire.calibration_rules import CalibrationRules
-from labrig.acquire.luminance_reading import LuminanceReading
 from labrig.acquire.roles import ROLES
 from labrig.calibration import CalibrationKind, kinds
 from labrig.foundation import resources
@@ -15,8 +15,106 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
 from labrig.foundation.plugins import DRIVERS, load
-from labrig.foundation.quantity import DurationS
+from labrig.foundation.quantity import DurationS, Fraction
 from labrig.foundation.yaml_file import did_you_mean, read_yaml, validate
+
+
+class CalibrationRules(FrozenModel):
+    """Limits within which a kept calibration still holds.
+
+    Attributes
+    ----------
+    find
+        Whether calibrations that are kept beside the runs are used at all.
+    at_most_age
+        Age beyond which a calibration is too old, for example `720 h`.
+    brightness
+        Change of the card's brightness through the filter beyond which it no longer holds, for
+        example `5 %`: the lamp aged or was moved, or the card is another one.
+    colour
+        Change of the lamp's light at 420 nm relative to that at 680 nm beyond which it no longer
+        holds, for example `3 %`.
+    shift_nm
+        Shift of the filter before the camera in nm along the strip beyond which it no longer holds.
+    unevenness
+        Change at single wavelengths that neither brightness nor colour explain, beyond which it no
+        longer holds, for example `4 %`: another card or another filter.
+    only_warn
+        Rules that only give a warning where they are broken.
+    """
+
+    find: bool = True
+    at_most_age: DurationS = Field(720 * 3600.0, gt=0)
+    brightness: Fraction = Field(0.05, gt=0, lt=1)
+    colour: Fraction = Field(0.03, gt=0, lt=1)
+    shift_nm: float = Field(2.0, gt=0, allow_inf_nan=False)
+    unevenness: Fraction = Field(0.04, gt=0, lt=1)
+    only_warn: tuple[
+        Literal["age", "lens", "brightness", "colour", "shift_nm", "unevenness"], ...
+    ] = ("age",)
+
+
+#: Units of readings, each with the place at which it is taken.
+UNITS = {"lx": "sample plane", "cd/m2": "card"}
+_READING = re.compile(
+    r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)\s*(?P<unit>lx|cd\s*/\s*m(?:2|²))\s*"
+)
+
+#: Kinds of lamps by which standards excite, and others that a bench may have.
+LampType = Literal["xenon", "D65 fluorescent", "fluorescent", "halogen", "LED", "daylight", "other"]
+
+
+class LuminanceReading(FrozenModel):
+    """One reading of a luxmeter or a luminance meter under the bare, warm lamp of the bench.
+
+    Attributes
+    ----------
+    value
+        Reading with its unit: an illuminance such as `312 lx`, or the luminance of the lit grey
+        card such as `95 cd/m2`.
+    sigma
+        Relative standard uncertainty of the reading by the meter's calibration, for example `3 %`.
+    at
+        Place of the meter: `sample plane` for an illuminance, `card` for a luminance.
+    lamp
+        Kind of the lamp: `xenon`, `D65 fluorescent`, `fluorescent`, `halogen`, `LED`, `daylight` or
+        `other`. Default: not stated, which accords with no standard.
+    spectrum
+        Spectrum of the lamp at the sample: name of a shipped file or path of a file. Default: that
+        of `lamp` under `optics:`.
+    f1_prime
+        General mismatch index f1′ of the meter, for example `5 %`. Default: not stated.
+    """
+
+    value: str
+    sigma: Fraction = Field(gt=0, lt=1)
+    at: Literal["sample plane", "card"]
+    lamp: LampType | None = None
+    spectrum: ShippedOrFile | None = None
+    f1_prime: Fraction | None = Field(None, ge=0, lt=1)
+
+    @model_validator(mode="after")
+    def _unit_of_its_place(self) -> Self:
+        match = _READING.fullmatch(self.value)
+        if match is None or not float(match["number"]) > 0:
+            raise ValueError(
+                "value: expected a reading above 0 with its unit, such as '312 lx' or '95 cd/m2', "
+                f"got '{self.value}'"
+            )
+        unit = "lx" if match["unit"] == "lx" else "cd/m2"
+        if UNITS[unit] != self.at:
+            raise ValueError(
+                f"expected lx at the sample plane or cd/m2 at the card, got {unit} at: {self.at}"
+            )
+        return self
+
+    @cached_property
+    def number(self) -> float:
+        """Reading in lx at the sample plane, in cd/m² at the card."""
+        match = _READING.fullmatch(self.value)
+        assert match is not None
+        return float(match["number"])
+
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -34,7 +132,7 @@ class DeviceEntry(BaseModel):
     ----------
     driver
         Name of the device's driver, which decides what the other keys are, for example
-        `numato_relay`.
+        `numato`.
     address
         Address of the device: a serial port (`COM3`, `/dev/ttyACM0`, `/dev/cu.usbmodem…`), a USB
         device (`usb://04a9:3199`, with `/SERIAL` behind it if there are two alike), a network
@@ -293,14 +391,14 @@ def read_rig_file(path: str | Path) -> RigFile:
     >>> rig.name
     'simulated dark room with LVF'
     >>> rig.devices["lamp"].driver, rig.optics.camera
-    ('numato_relay', 'canon_eos_5d_mark_ii')
+    ('numato', 'canon_eos_5d_mark_ii')
     """
     path = Path(path)
     folder = path.resolve().parent
     content = with_absolute_paths(read_yaml(path), RigFile, folder)
     if isinstance(devices := content.get("devices"), dict):
         content["devices"] = {
-            key: _device_with_absolute_paths(entry, folder) for key, entry in devices.items()
+            key: _device_with_absolute_paths(key, entry, folder) for key, entry in devices.items()
         }
     rig = validate(content, RigFile, str(path))
     for key in rig.devices:
@@ -311,16 +409,18 @@ def read_rig_file(path: str | Path) -> RigFile:
     return rig
 
 
-def _device_with_absolute_paths(entry: Any, folder: Path) -> Any:
+def _device_with_absolute_paths(key: str, entry: Any, folder: Path) -> Any:
     """Return a device's keys with absolute paths where its driver's settings name files."""
     if not isinstance(entry, dict) or not isinstance(name := entry.get("driver"), str):
         return entry
-    keys = {key: value for key, value in entry.items() if key not in DeviceEntry.model_fields}
-    if not _has_path(keys):
+    keys = {each: value for each, value in entry.items() if each not in DeviceEntry.model_fields}
+    if not _has_path(keys) or key not in ROLES:
         return entry  # nor is its driver needed yet
     try:
-        driver = load(DRIVERS, name, "")
+        driver = ROLES[key].driver(load(DRIVERS, name, ""))
     except UsageError:  # told where it is needed
+        return entry
+    if driver is None:
         return entry
     return entry | with_absolute_paths(keys, driver.Settings, folder)
 

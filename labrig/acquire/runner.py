@@ -274,8 +274,8 @@ class _Recorder:
     def all_actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self._all_actions if action.device == device]
 
-    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
-        return decide()
+    def decide(self, name: str, on_bench: Callable[[], T], when_planned: T) -> T:
+        return on_bench()
 
     def seed(self) -> int:
         return self._seed

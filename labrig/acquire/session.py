@@ -84,8 +84,8 @@ class Recorder(Protocol):
     def all_actions(self, device: str) -> Sequence[ActionRecord]:
         """Return the actions of a device in order of time, those of failed attempts included."""
 
-    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
-        """Return `decide()` on a bench; `worst` in a plan, which has no data to decide on."""
+    def decide(self, name: str, on_bench: Callable[[], T], when_planned: T) -> T:
+        """Return `on_bench()` on a bench; `when_planned` in a plan, which has no data for it."""
 
     def seed(self) -> int:
         """Return a seed of this unit's random numbers, the same in all attempts at it."""
@@ -326,14 +326,14 @@ class Session:
             self._dark_since_s,
         )
 
-    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
-        """Make and record a choice that depends on frames already taken; the plan assumes `worst`.
+    def decide(self, name: str, on_bench: Callable[[], T], when_planned: T) -> T:
+        """Make and record a decision on frames already taken; a plan assumes `when_planned`.
 
-        `decide` must depend on recorded frames only, so that a resumed run makes the same choice.
+        `on_bench` must depend on recorded frames only, so that a resumed run decides the same.
         """
-        chosen = self._recorder.choose(what, decide, worst)
+        chosen = self._recorder.decide(name, on_bench, when_planned)
         now_s = self.clock.now()
-        self._recorder.acted("protocol", f"{what}: {chosen}", now_s, now_s, 0.0)
+        self._recorder.acted("protocol", f"{name}: {chosen}", now_s, now_s, 0.0)
         return chosen
 
     def seed(self, purpose: str) -> int:
@@ -453,7 +453,7 @@ class _PartRecorder:
         self.temperature = recorder.temperature
         self.last_manual_step = recorder.last_manual_step
         self.all_actions = recorder.all_actions
-        self.choose = recorder.choose
+        self.decide = recorder.decide
         self.seed = recorder.seed
         self._recorder = recorder
         self._part = part

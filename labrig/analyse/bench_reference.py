@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import StripFrames
 from labrig.calibration import (
     LVF_KIND,
@@ -22,7 +22,7 @@ from labrig.reduce import read_exif, read_raw, strip_profile_in
 from labrig.results import RunResult
 
 
-def reference_of(part: Part, result: RunResult) -> ReferenceFile | None:
+def reference_of(context: AnalysisContext, result: RunResult) -> ReferenceFile | None:
     """Return the bench to which a run belongs that measures one kind of calibration of it.
 
     Parameters
@@ -44,31 +44,36 @@ def reference_of(part: Part, result: RunResult) -> ReferenceFile | None:
 
     Examples
     --------
-    >>> from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, reference_of
+    >>> from labrig.analyse import AnalysisContext, Inputs, Overrides, read_run_protocol
+    >>> from labrig.analyse import reference_of
     >>> import labrig
     >>> run, result = labrig.read_run("runs/decay"), labrig.read_result("runs/decay")
     >>> rig = Overrides().bench(run.folder)
-    >>> part = Part(run, read_run_protocol(run.folder), rig, Overrides(), Inputs())
+    >>> part = AnalysisContext(run, read_run_protocol(run.folder), rig, Overrides(), Inputs())
     >>> reference_of(part, result) is None
     True
     """
-    kind = next((kind for kind in kinds() if kind.protocol == part.protocol.protocol), None)
-    has_frames = any(attempt.frames for attempt in part.run.completed().values())
+    kind = next((kind for kind in kinds() if kind.protocol == context.protocol.protocol), None)
+    has_frames = any(attempt.frames for attempt in context.run.completed().values())
     if kind is None or not kind.of_bench or kind.name == REFERENCE_KIND.name or not has_frames:
         return None
     if kind.name not in result.provides():
         return None
     lvf = result.provides()[kind.name] if kind.name == LVF_KIND.name else None
-    return bench_reference(part, None if lvf is None else card_picture(part, lvf), {kind.protocol})
+    return bench_reference(
+        context, None if lvf is None else card_picture(context, lvf), {kind.protocol}
+    )
 
 
-def bench_reference(part: Part, picture: CardPicture | None, measured: set[str]) -> ReferenceFile:
-    run, optics = part.run, part.rig.optics
+def bench_reference(
+    context: AnalysisContext, picture: CardPicture | None, measured: set[str]
+) -> ReferenceFile:
+    run, optics = context.run, context.rig.optics
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     temperatures_c = [reading.temperature_c for reading in run.temperatures()]
     last_s = round(max(frame.end_time for frame in frames))
     return ReferenceFile(
-        bench=part.rig.name,
+        bench=context.rig.name,
         camera=run.camera_identity or None,
         lens=read_exif(read_bytes(frames[-1].path, MAX_FRAME_BYTES)).lens,
         lamp=optics.lamp,
@@ -82,9 +87,9 @@ def bench_reference(part: Part, picture: CardPicture | None, measured: set[str])
     )
 
 
-def card_picture(part: Part, lvf: LvfFile) -> CardPicture:
+def card_picture(context: AnalysisContext, lvf: LvfFile) -> CardPicture:
     """Return the picture of the card through the filter, without a colour filter."""
-    frames = StripFrames(part)
+    frames = StripFrames(context)
     shown = frames.of(LvfFrames.FILTER, filter_unit(None))
     strip = frames.find_strip(LvfFrames.FILTER, filter_unit(None)).strip(rising=True)
     assert lvf.before_camera is not None, "a calibration tells where the filter was"
@@ -95,8 +100,8 @@ def card_picture(part: Part, lvf: LvfFile) -> CardPicture:
     rates = np.maximum(place_means(strip_profile_in(shown, strip), SLICES), 0.0)
     return CardPicture(
         strip=strip.model_copy(update={"rising": rising}),
-        iso=part.protocol.camera.iso,
-        f_number=part.protocol.camera.f_number,
+        iso=context.protocol.camera.iso,
+        f_number=context.protocol.camera.f_number,
         channels=raw.channels,
         wavelength_nm=tuple(np.round(nm, 3).tolist()),
         rate_dn_per_s=tuple(tuple(row) for row in rates.tolist()),

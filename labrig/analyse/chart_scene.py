@@ -1,17 +1,17 @@
-"""A ColorChecker under the rig's lamp, with or without a grey card in its place."""
+"""A ColorChecker under the rig's lamp, and colours from a camera's values by its curves."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import PRECISE_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
-from labrig.optics import CHART_PATCHES
+from labrig.optics import CHART_PATCHES, CIE_1931, CameraResponse, Spectrum, observer
 from labrig.record import FrameRole
 from labrig.reduce import SeriesFrame, find_colour_chart, region_values
 from labrig.results import SliceValues
@@ -49,7 +49,7 @@ class ChartScene:
     range: float | None
 
 
-def frames_of(part: Part, role: str) -> list[SeriesFrame]:
+def frames_of(context: AnalysisContext, role: str) -> list[SeriesFrame]:
     """Return the frames of a role, checked against their sums and the calibrated camera.
 
     Raises
@@ -57,17 +57,18 @@ def frames_of(part: Part, role: str) -> list[SeriesFrame]:
     DataError
         There are none, they are damaged, or they are of another camera.
     """
-    frames = steady_frames(part.run, part.overrides, role)
+    frames = steady_frames(context.run, context.overrides, role)
     if not frames:
         raise DataError(
-            f"{part.run.folder}: there are no complete '{role}' frames; go on with: labrig resume "
-            f"{part.run.folder}"
+            f"{context.run.folder}: there are no complete '{role}' frames; go on with: "
+            "labrig resume "
+            f"{context.run.folder}"
         )
-    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, part.run.frames(role))
+    require_calibrated_camera(context.inputs[CAMERA_KIND], context.run, context.run.frames(role))
     return frames
 
 
-def chart_scene(part: Part, chart_role: str, card_role: str | None) -> ChartScene:
+def chart_scene(context: AnalysisContext, chart_role: str, card_role: str | None) -> ChartScene:
     """Find the chart in its frames, and measure its patches.
 
     Parameters
@@ -82,11 +83,11 @@ def chart_scene(part: Part, chart_role: str, card_role: str | None) -> ChartScen
     DataError
         Frames are missing or damaged, no chart is found, or it is too dark or clipped.
     """
-    frames = frames_of(part, chart_role)
+    frames = frames_of(context, chart_role)
     # The shortest exposure of a bracket is metered: nothing clips.
     metered = min(frames, key=lambda frame: frame.exposure_s)
     patches = find_colour_chart(metered.path)
-    chart = _measured(part, frames, patches)
+    chart = _measured(context, frames, patches)
     clipped = [
         name for name, row in zip(CHART_PATCHES, chart.value, strict=True) if np.isnan(row).any()
     ]
@@ -106,10 +107,10 @@ def chart_scene(part: Part, chart_role: str, card_role: str | None) -> ChartScen
     scene = ChartScene(chart.value, chart.sigma, None, place, UNEVEN, None)
     if card_role is None:
         return scene
-    card = _measured(part, frames_of(part, card_role), patches)
+    card = _measured(context, frames_of(context, card_role), patches)
     if not (card.value > PRECISE_SIGMA * card.sigma).all():
         raise DataError(
-            f"{part.run.folder}: expected a grey card lit at every place of the chart, got one "
+            f"{context.run.folder}: expected a grey card lit at every place of the chart, got one "
             "that is too dark or clips; lay it where the chart lies, all of it"
         )
     return _evened(scene, card)
@@ -125,9 +126,37 @@ def _evened(scene: ChartScene, card: SliceValues) -> ChartScene:
     return replace(scene, value=value, sigma=sigma, card=mean, unevenness=EVENED, range=spread)
 
 
-def _measured(part: Part, frames: list[SeriesFrame], patches: list[Region]) -> SliceValues:
-    darks = steady_frames(part.run, part.overrides, FrameRole.DARK)
+def _measured(
+    context: AnalysisContext, frames: list[SeriesFrame], patches: list[Region]
+) -> SliceValues:
+    darks = steady_frames(context.run, context.overrides, FrameRole.DARK)
     regions = {f"{number:02d}": region for number, region in enumerate(patches)}
-    values = region_values(frames, regions, darks, part.inputs[CAMERA_KIND])
+    values = region_values(frames, regions, darks, context.inputs[CAMERA_KIND])
     (unit,) = {frame.unit for frame in frames}
     return values[unit]
+
+
+#: Reflectances that a camera's matrix is for: smooth, σ of their level and course, and distance in
+#: nm at which they are independent.
+LEVEL_SIGMA, COURSE_SIGMA, COURSE_NM = 0.5, 0.25, 50.0
+#: Width in nm of the structure of emissions.
+EMISSION_NM = 20.0
+STEP_NM = 5.0
+
+
+def camera_matrix(camera: CameraResponse, light: Spectrum | None) -> FloatArray:
+    """Return the matrix (3, k) from values to X, Y, Z, best for what may come back of a light.
+
+    It minimises the mean squared error over smooth reflectances of a normal density; without a
+    light, over spectra as dyes emit.
+    """
+    nm = np.arange(camera.wavelength_nm[0], camera.wavelength_nm[-1] + STEP_NM / 2, STEP_NM)
+    power = np.ones_like(nm) if light is None else light.at(nm)
+    eye = observer(CIE_1931)
+    seen = power * np.array([np.interp(nm, eye.wavelength_nm, f) for f in eye.functions.T])
+    counted = power * camera.at(nm).T
+    level, course_nm = (0.0, EMISSION_NM) if light is None else (LEVEL_SIGMA, COURSE_NM)
+    off = (nm[:, np.newaxis] - nm) / course_nm
+    covariance = level**2 + COURSE_SIGMA**2 * np.exp(-(off**2) / 2)
+    matrix = np.linalg.solve(counted @ covariance @ counted.T, counted @ covariance @ seen.T).T
+    return np.asarray(matrix)

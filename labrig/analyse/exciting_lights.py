@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.acquire import MONOCHROMATOR, driver_and_settings
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import filter_transmittances, led_exposures
 from labrig.calibration import LEDS_KIND
 from labrig.foundation.arrays import FloatArray
@@ -61,7 +61,9 @@ class ExcitingLight:
         return self.spectrum.at(grid_nm - self.wavelength_sigma_nm)
 
 
-def exciting_lights(part: Part, lights: ExcitingLights, lamp: Spectrum) -> list[ExcitingLight]:
+def exciting_lights(
+    context: AnalysisContext, lights: ExcitingLights, lamp: Spectrum
+) -> list[ExcitingLight]:
     """Return what is known of all lights of a run without the camera, in order.
 
     Parameters
@@ -80,51 +82,52 @@ def exciting_lights(part: Part, lights: ExcitingLights, lamp: Spectrum) -> list[
     DataError
         The spectrometer saw nothing of the lamp.
     """
-    if part.run.spectra(CardSpectra.DIRECT):
-        return [_measured(part, name, lamp) for name in lights.names()]
+    if context.run.spectra(CardSpectra.DIRECT):
+        return [_measured(context, name, lamp) for name in lights.names()]
     if lights.leds:
-        known = led_exposures(part.rig, part.rig.name, part.inputs[LEDS_KIND])
+        known = led_exposures(context.rig, context.rig.name, context.inputs[LEDS_KIND])
         if missing := [name for name in lights.leds if name not in known]:
             raise UsageError(
-                f"rig '{part.rig.name}': expected an LED '{missing[0]}', got {', '.join(known)}"
+                f"rig '{context.rig.name}': expected an LED '{missing[0]}', got {', '.join(known)}"
             )
         exposures = [known[name] for name in lights.leds]
         return [ExcitingLight(one.light, math.inf, one.wavelength_sigma_nm) for one in exposures]
     if lights.filters:
-        curves = filter_transmittances(part.rig, lights.filters)
+        curves = filter_transmittances(context.rig, lights.filters)
         return [ExcitingLight(_through(lamp, each), FILTER_SIGMA, FILTER_NM) for each in curves]
-    if MONOCHROMATOR.key not in part.rig.devices:
+    if MONOCHROMATOR.key not in context.rig.devices:
         raise UsageError(
-            f"rig '{part.rig.name}': expected 'monochromator' under 'devices', which has the width "
+            f"rig '{context.rig.name}': expected 'monochromator' under 'devices', which "
+            "has the width "
             "of its band, found none"
         )
-    driver, settings = driver_and_settings(part.rig, MONOCHROMATOR.key, part.rig.name)
-    band = driver.declared_band(settings)
+    _, band = driver_and_settings(context.rig, MONOCHROMATOR.key, context.rig.name)
     return [
         ExcitingLight(_through(lamp, band.transmittance(nm)), math.inf, band.wavelength_sigma)
         for nm in lights.monochromator
     ]
 
 
-def _measured(part: Part, name: str, lamp: Spectrum) -> ExcitingLight:
+def _measured(context: AnalysisContext, name: str, lamp: Spectrum) -> ExcitingLight:
     """Return a light by the spectrometer, over the lamp that it has read in the same rounds."""
-    units = {light_unit(name, number) for number in range(1, part.protocol.rounds + 1)}
-    readings = [one for one in part.run.spectra(CardSpectra.LIGHT) if one.unit in units]
+    units = {light_unit(name, number) for number in range(1, context.protocol.rounds + 1)}
+    readings = [one for one in context.run.spectra(CardSpectra.LIGHT) if one.unit in units]
     dark = {
         one.integration_s: read_spectrometer_reading(one.path)
-        for one in part.run.spectra(CardSpectra.DARK)
+        for one in context.run.spectra(CardSpectra.DARK)
     }
-    grid_nm, of_lamp, lamp_sigma = _mean_rate(part.run.spectra(CardSpectra.DIRECT), dark)
+    grid_nm, of_lamp, lamp_sigma = _mean_rate(context.run.spectra(CardSpectra.DIRECT), dark)
     _, rate, sigma = _mean_rate(readings, dark)
     is_lit = of_lamp > np.maximum(SEEN * lamp_sigma, LEAST_LAMP * of_lamp.max())
     if np.count_nonzero(is_lit) < SMOOTHED:
         raise DataError(
-            f"{part.run.folder}: expected the lamp's light in the spectrometer's readings of the "
+            f"{context.run.folder}: expected the lamp's light in the "
+            "spectrometer's readings of the "
             "card, got none; turn its head to the card"
         )
     is_seen = rate > SEEN * sigma
     if not is_seen[is_lit].any():
-        raise DataError(f"{part.run.folder}: the spectrometer saw nothing of the light '{name}'")
+        raise DataError(f"{context.run.folder}: the spectrometer saw nothing of the light '{name}'")
     # Far from the light there is only noise, which would add to other bands.
     weight = np.where(is_seen & is_lit, rate, 0.0)
     middle_nm = np.average(grid_nm, weights=weight)

@@ -1,4 +1,4 @@
-"""Forward model of a frame through the LVF: filter, camera curves, white reference.
+"""Forward model of a frame through the LVF: filter, strip, camera curves, white reference.
 
 Camera curves from another laboratory are off by some per cent, and so is every spectrum obtained
 with them. A grey card under a known lamp, seen through the same filter, measures the deviation in
@@ -7,28 +7,21 @@ every position and channel, and constrains the model's errors.
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from labrig.analyse.combined_frames import CombinedFrame, combined
-from labrig.analyse.inputs import Part
-from labrig.analyse.strip import StripPatch, slice_strip, strip_regions
-from labrig.analyse.strip_model import (
-    ANY_BRIGHTNESS,
-    LAMP_SIGMA,
-    channel_cameras,
-    channel_positions,
-    conditioned_on_white,
-    strip_system,
-)
+from labrig.analyse.inputs import AnalysisContext
+from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import LVF_KIND
-from labrig.fit.spectrum import SpectralSystem
+from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.region import Region
 from labrig.optics import (
+    Bands,
     CameraResponse,
     Lvf,
     Spectrum,
@@ -37,8 +30,115 @@ from labrig.optics import (
     read_monochrome_camera,
     signal_through,
 )
-from labrig.reduce import SeriesFrame, sensor_layout
+from labrig.reduce import SensorLayout, SeriesFrame, sensor_layout
 from labrig.results import FilterFrames
+
+#: Relative uncertainty of a lamp's spectrum whose file has none.
+LAMP_SIGMA = 0.01
+#: Prior σ of the frame's relative brightness, uninformative.
+ANY_BRIGHTNESS = 1e3
+
+
+def channel_positions(layout: SensorLayout, strip: Strip, slices: Slices) -> FloatArray:
+    """Return the middle of each channel's own pixels in every slice, shape (channels, positions).
+
+    Pixels of one colour are two apart: where slices are few pixels wide, that is some nanometres.
+    """
+    middles = np.array([layout.middle_columns(region) for region in slices.values()]).T
+    across = (strip.right[0] - strip.left[0]) * layout.width
+    fraction = (middles - strip.left[0] * layout.width) / across + tilt_offset(
+        strip, slices, layout
+    )
+    return fraction if strip.rising else 1 - fraction
+
+
+def strip_system(
+    lvfs: Sequence[Lvf], camera: CameraResponse, knots_nm: FloatArray
+) -> SpectralSystem:
+    """Return the system whose channels each see the filter in a place of their own.
+
+    An error of the filter is common to the channels of a slice, one of a curve is the channel's.
+    """
+    error = CurveError()
+    parts = [
+        system_through_lvf(lvf, channel, knots_nm, error)
+        for lvf, channel in zip(lvfs, channel_cameras(camera), strict=True)
+    ]
+    filter_modes = sum(
+        int(np.count_nonzero(getattr(lvfs[0].sigma, parameter.name))) for parameter in fields(Bands)
+    )
+    curves = len(parts[0].modes) - filter_modes
+    count, knots = len(parts), len(knots_nm)
+    shape = (len(parts[0].design), count, knots)
+    design = np.stack([part.design for part in parts], axis=1)
+    modes = []
+    for number, part in enumerate(parts):
+        channel_modes = np.zeros((curves, *shape))
+        channel_modes[:, :, number] = part.modes[:curves]
+        modes.append(channel_modes)
+    modes.append(np.stack([part.modes[curves:] for part in parts], axis=2))
+    rows = shape[0] * count
+    return SpectralSystem(
+        knots_nm, design.reshape(rows, knots), np.concatenate(modes).reshape(-1, rows, knots)
+    )
+
+
+def channel_cameras(camera: CameraResponse) -> list[CameraResponse]:
+    """Return each channel as a camera of its own."""
+    return [
+        CameraResponse(
+            camera.name,
+            camera.wavelength_nm,
+            camera.sensitivity[:, [number]],
+            (name,),
+            None if camera.sigma is None else camera.sigma[:, [number]],
+        )
+        for number, name in enumerate(camera.channels)
+    ]
+
+
+def conditioned_on_white(
+    system: SpectralSystem,
+    value: FloatArray,
+    sigma: FloatArray,
+    light: Spectrum,
+    expected: FloatArray,
+) -> SpectralSystem:
+    """Condition the system on a frame of a known light.
+
+    With value = g (expected + Σ_k z_k modes_k · light) + noise, z and g normal, this is the mean
+    and covariance of z given the frame.
+
+    Parameters
+    ----------
+    system
+        Linear model with error modes.
+    value, sigma
+        Values of the frame in any unit and their standard uncertainties, shape (m,); NaN where it
+        clips.
+    light
+        Spectrum of the light that was photographed.
+    expected
+        Values by the system's own curves, wavelengths beyond its knots included, shape (m,).
+    """
+    is_finite = np.isfinite(value) & np.isfinite(sigma)
+    gain = float(
+        expected[is_finite] @ value[is_finite] / (expected[is_finite] @ expected[is_finite])
+    )
+    y, s = value[is_finite] / gain, sigma[is_finite] / gain
+    mode_values = system.modes[:, is_finite] @ light.at(system.knots_nm)
+    levers = np.vstack([mode_values, ANY_BRIGHTNESS * expected[is_finite]])
+    noise = np.hypot(s, LAMP_SIGMA * expected[is_finite])
+    whitened = levers / noise
+    precision = np.eye(len(levers)) + whitened @ whitened.T
+    mean = np.linalg.solve(precision, whitened @ ((y - expected[is_finite]) / noise))
+    # Rows of the root of the covariance: independent again, each of unit variance.
+    root = np.linalg.inv(np.linalg.cholesky(precision))[:, :-1]
+    design = system.design + np.tensordot(mean[:-1], system.modes, axes=1)
+    return SpectralSystem(
+        system.knots_nm, np.maximum(design, 0.0), np.tensordot(root, system.modes, axes=1)
+    )
+
 
 #: Range in which the holder is read, in heights of the strip from its middle; the filter's own
 #: blurred edges end at 0.7.
@@ -106,7 +206,7 @@ class LvfModel(ForwardModel):
 
 
 def forward_models(
-    part: Part, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
+    context: AnalysisContext, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
 ) -> tuple[dict[StripPatch, LvfModel], tuple[str, ...]]:
     """Return the model of every patch of a part, and the reasons for patches without one.
 
@@ -126,7 +226,7 @@ def forward_models(
     DataError
         No patch lies below the filter.
     """
-    calibration = part.inputs[LVF_KIND]
+    calibration = context.inputs[LVF_KIND]
     if calibration is None or calibration.before_camera is None:
         raise UsageError(
             "a spectrum needs the LVF calibrated before the camera: run the protocol "
@@ -134,8 +234,8 @@ def forward_models(
             "process --optics"
         )
     layout, strip, lvf = sensor_layout(frame), calibration.before_camera, calibration.lvf
-    camera, holder = channel_curves(part, layout.channels), _holder_regions(strip)
-    asked = strip_regions(part) if patches is None else patches
+    camera, holder = channel_curves(context, layout.channels), _holder_regions(strip)
+    asked = strip_regions(context) if patches is None else patches
     sliced, refused = slice_strip(asked, strip, layout)
     models: dict[StripPatch, LvfModel] = {}
     for patch, slices in sliced.items():
@@ -149,7 +249,7 @@ def forward_models(
 
 
 def with_white_reference(
-    model: ForwardModel, part: Part, white: FilterFrames | None
+    model: ForwardModel, context: AnalysisContext, white: FilterFrames | None
 ) -> tuple[ForwardModel, tuple[str, ...]]:
     """Condition the model on frames of the grey card, if there are any; return it with warnings.
 
@@ -160,13 +260,13 @@ def with_white_reference(
     """
     if white is None:
         return model, ()
-    optics = part.rig.optics
+    optics = context.rig.optics
     if optics.lamp is None or optics.grey_card is None:
         return model, (
             "the white picture says nothing, since the spectra of lamp and grey card are not "
             "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
         )
-    light = card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
+    light = card_light(lamp_spectrum(context.rig), card_reflectance(context.rig))
     white_frame = combined(white)
     if not white_frame.shows_light:
         return model, ("the white picture is dark or clips throughout; the spectrum does without",)
@@ -222,7 +322,7 @@ def card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
     return Spectrum(lamp.name, fine, lamp.at(fine) * card.at(fine))
 
 
-def channel_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
+def channel_curves(context: AnalysisContext, channels: tuple[str, ...]) -> CameraResponse:
     """Return the curves of the camera, in the order of a frame's channels.
 
     Raises
@@ -231,10 +331,10 @@ def channel_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
         The camera has other channels.
     """
     if len(channels) == 1:
-        name = part.overrides.camera or part.rig.optics.camera
+        name = context.overrides.camera or context.rig.optics.camera
         if name is not None:
             return read_monochrome_camera(name)
-    camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
+    camera = camera_curves(context.rig, context.overrides.camera, context.inputs[LVF_KIND])
     if camera.channels != channels:
         raise DataError(
             f"expected frames with the channels {', '.join(camera.channels)} or one alone, got "

@@ -1,18 +1,24 @@
-"""Frames of a run for its analysis: intact, of this camera, timed, without stray light."""
+"""Frames of a run for its analysis: intact, of this camera, timed, without stray light or glare.
+
+Of veiling glare: light of the patch itself does not matter: a lens scatters it with the course of
+the patch's own.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from labrig.analyse.inputs import Part
+import numpy as np
+
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile, CameraFile
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
-from labrig.foundation.region import Region
+from labrig.foundation.region import Region, region_pixels
 from labrig.record import Attempt, FileRecord, FrameRecord, FrameRole, RunRecord, damaged_frames
-from labrig.reduce import SeriesFrame, read_exif
-from labrig.results import add_flag
+from labrig.reduce import SensorLayout, SeriesFrame, read_exif
+from labrig.results import Series, add_flag
 
 
 def lens_of(frames: Sequence[FrameRecord]) -> str | None:
@@ -133,7 +139,7 @@ def _damage_text(damaged: Mapping[FileRecordT, str]) -> str:
     )
 
 
-def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
+def part_frames(context: AnalysisContext, *roles: str) -> list[FrameRecord]:
     """Return frames of completed units with one of the roles, without those the user excludes.
 
     Raises
@@ -141,13 +147,15 @@ def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
     DataError
         A frame is missing or was changed after the run.
     """
-    require_intact(part.run, roles, part.overrides)
+    require_intact(context.run, roles, context.overrides)
     return [
-        frame for frame in _frames_in_roles(part.run, roles) if not part.overrides.excludes(frame)
+        frame
+        for frame in _frames_in_roles(context.run, roles)
+        if not context.overrides.excludes(frame)
     ]
 
 
-def part_region(part: Part, region: Region) -> Region:
+def part_region(context: AnalysisContext, region: Region) -> Region:
     """Return the protocol's only `region`, or the user's region instead.
 
     Raises
@@ -155,12 +163,12 @@ def part_region(part: Part, region: Region) -> Region:
     UsageError
         The user names a region.
     """
-    if named := [name for name in part.overrides.regions if name]:
+    if named := [name for name in context.overrides.regions if name]:
         raise UsageError(
             f"--roi: expected x,y,width,height, since this run has one region only, got the name "
             f"'{named[0]}'"
         )
-    return part.overrides.regions.get("", region)
+    return context.overrides.regions.get("", region)
 
 
 #: Flag of a frame that begins before the bench is dark.
@@ -377,3 +385,68 @@ def _flag_frame(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> S
     flag = "late" if frame.late_s > LATE_S else ""
     flag = add_flag(flag, "excluded") if overrides.excludes(frame) else flag
     return replace(timed(frame, switched_time(attempt, frame, "off")), flag=flag)
+
+
+#: Glare of a clean photographic lens, as a fraction of the frame's mean light.
+USUAL_GLARE = 0.01
+#: Flicker of a frame's light, common to all patches.
+FLICKER = 0.007
+#: Change of the course of a glow by the glare, in σ of all frames, and of its level, that matter.
+COURSE_SIGMAS, LEVEL = 2.0, 0.01
+
+
+def glare_warning(
+    series: Mapping[str, Series],
+    regions: Mapping[str, Region],
+    frame: Series,
+    layout: SensorLayout,
+) -> tuple[str, ...]:
+    """Return one line that names the patches for which a usual glare matters; empty for none.
+
+    Parameters
+    ----------
+    series, regions
+        Series of every patch, and its region.
+    frame
+        Series of the whole frame.
+    layout
+        Size of the sensor.
+    """
+    matters = {
+        name: fraction
+        for name, patch_series in series.items()
+        if (fraction := _matters(patch_series, _area(regions[name], layout), frame)) > 0
+    }
+    if not matters:
+        return ()
+    largest = max(matters, key=lambda name: matters[name])
+    return (
+        f"the light of the rest of the frame may veil {', '.join(matters)}: a veiling glare of "
+        f"{100 * USUAL_GLARE:.0f} %, as lenses have, would be up to {100 * matters[largest]:.2g} % "
+        f"of {largest}'s signal; measure it with camera_calibration (black:), or photograph dim "
+        "patches without bright ones",
+    )
+
+
+def _area(region: Region, layout: SensorLayout) -> float:
+    """Return the part of the frame that a region covers."""
+    _, _, width, height = region_pixels(region, layout.width, layout.height)
+    return width * height / (layout.width * layout.height)
+
+
+def _matters(series: Series, area: float, frame: Series) -> float:
+    """Return a usual glare over the signal of a patch in the channel of most, 0 if no matter."""
+    rows = series.usable & frame.usable & np.isfinite(series.sigma).all(axis=1)
+    if not rows.any():
+        return 0.0
+    signal, sigma = series.values[rows], series.sigma[rows]
+    veil = USUAL_GLARE * (frame.values[rows] - area * signal)
+    weight = 1 / (np.square(sigma) + np.square(FLICKER * signal))
+    power = (weight * np.square(signal)).sum(axis=0)
+    # What is like the signal changes its level, the rest its course.
+    levels = (weight * signal * veil).sum(axis=0) / power
+    course_sigmas = np.sqrt((weight * np.square(veil - levels * signal)).sum())
+    brightest = np.argmax((signal / sigma).sum(axis=0))
+    if abs(levels[brightest]) < LEVEL and course_sigmas < COURSE_SIGMAS:
+        return 0.0
+    return float(np.abs(levels).max())

@@ -4,6 +4,7 @@ A white reference of known reflectance tells what each light is. It lies beside 
 same image, or in the sample's place in another one.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Self
@@ -11,9 +12,8 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from labrig.analyse.direct_columns import direct_columns
 from labrig.fit import LitSpectrum, bispectral_columns
-from labrig.fit.bispectral import light_window_nm
+from labrig.fit.bispectral import BispectralColumns, light_window_nm, separate_columns
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
@@ -26,6 +26,30 @@ from labrig.optics import (
     read_transmittance,
 )
 from labrig.results import DirectColumns, Measured
+
+
+def direct_columns(
+    lights: Sequence[str], columns: BispectralColumns, drift: Measured
+) -> DirectColumns:
+    """Return columns with reflected and re-radiated light taken apart; `lights` in their order."""
+    separated = separate_columns(columns)
+    return DirectColumns(
+        lights=tuple(lights),
+        input_nm=columns.light_nm,
+        output_nm=columns.output_nm,
+        column=columns.column,
+        column_sigma=columns.column_sigma,
+        share=columns.share,
+        is_mixed=separated.is_mixed,
+        reflectance=separated.reflectance,
+        reflectance_sigma=separated.reflectance_sigma,
+        reradiated=separated.reradiated,
+        reradiated_sigma=separated.reradiated_sigma,
+        common_sigma=columns.common_sigma,
+        light_sigma=columns.power_sigma / columns.power,
+        drift=drift,
+    )
+
 
 #: Width of the bands of the light that comes back, and the longest wavelength, in nm.
 BAND_NM, LAST_NM = 10.0, 780.0

@@ -1,4 +1,4 @@
-"""Input of the analysis of one protocol."""
+"""Input of the analysis of one protocol, and of the parts of a chain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,6 +11,8 @@ from labrig.analyse.overrides import Overrides
 from labrig.analyse.process_options import OptionsT, chosen_options
 from labrig.bench_optics import calibration
 from labrig.calibration import CalibrationKind, kinds
+from labrig.foundation.errors import DataError, FitError
+from labrig.foundation.plugins import measurement
 from labrig.material import Material
 from labrig.record import RunRecord
 from labrig.results import EmissionSpectrum, FittedDecay, RunResult
@@ -83,7 +85,7 @@ class Inputs:
 
 
 @dataclass(frozen=True)
-class Part:
+class AnalysisContext:
     """One protocol's part of a run, or all of a run that is not a chain.
 
     Attributes
@@ -98,7 +100,7 @@ class Part:
         The user's settings.
     inputs
         Calibrations that the rig file names, and results of earlier parts of a chain.
-    beside
+    other_parts
         Record of the other parts' units, where samples took turns: the lamp burned for them, too.
     """
 
@@ -107,7 +109,7 @@ class Part:
     rig: RigFile
     overrides: Overrides
     inputs: Inputs
-    beside: RunRecord | None = None
+    other_parts: RunRecord | None = None
 
     def options(self, model: type[OptionsT]) -> OptionsT:
         """Return the measurement's own options, of those that the user gave.
@@ -118,3 +120,71 @@ class Part:
             A value is one that the option cannot have.
         """
         return chosen_options(model, self.overrides.options)
+
+
+@dataclass(frozen=True)
+class AnalysedParts:
+    """Results of the parts of a chain.
+
+    Attributes
+    ----------
+    results
+        Result of each part by its name, in the order of the chain.
+    failed
+        Reason why a part could not be analysed, by its name.
+    inputs
+        Calibrations and results after the last part, by the sample; those of the bench, and of the
+        only sample, under "".
+    warnings
+        Warnings of all parts, with their names.
+    """
+
+    results: Mapping[str, RunResult]
+    failed: Mapping[str, str]
+    inputs: Mapping[str, Inputs]
+    warnings: tuple[str, ...]
+
+
+def analyse_parts(context: AnalysisContext) -> AnalysedParts:
+    """Analyse every part of a chain; each may use the results of earlier ones.
+
+    Those of one sample do not use the results of another.
+
+    A part that cannot be analysed is a warning, as long as another one can.
+
+    Raises
+    ------
+    DataError, FitError
+        No part can be analysed.
+    """
+    results: dict[str, RunResult] = {}
+    failures: dict[str, DataError | FitError] = {}
+    warnings: list[str] = []
+    inputs = {"": context.inputs}
+    for link in context.protocol.chain():
+        kind = link.protocol.protocol
+        analyse_link = measurement(kind, str(context.run.folder)).load("analysis")
+        known = inputs.get(link.sample, inputs[""])
+        link_part = AnalysisContext(
+            context.run.part(link.name),
+            link.protocol,
+            context.rig,
+            context.overrides,
+            known,
+            context.run.without_part(link.name) if link.sample else None,
+        )
+        try:
+            result: RunResult = analyse_link(link_part)
+            if result.failures():
+                raise FitError("; ".join(result.failures()))
+        except (DataError, FitError) as error:
+            failures[link.name] = error
+            warnings.append(f"{link.name}: {error}")
+            continue
+        results[link.name] = result
+        warnings += [f"{link.name}: {warning}" for warning in result.warnings]
+        inputs[link.sample] = known.updated_by(result)
+    if not results:
+        raise next(iter(failures.values()))
+    failed = {name: str(error) for name, error in failures.items()}
+    return AnalysedParts(results, failed, inputs, tuple(warnings))

@@ -1,5 +1,6 @@
-"""Values of patches under LEDs or lamps, from brackets of frames with and without light."""
+"""Values of patches under LEDs or lamps, and the equations of lights and camera behind them."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -7,13 +8,18 @@ from typing import Literal
 import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import TYPICAL_FLICKER
+from labrig.bench_optics import LedExposure
 from labrig.calibration import CAMERA_KIND
+from labrig.fit.fluorescence import Exposure, FluorescenceSystem, fluorescence_system
+from labrig.fit.leds import CURVES_OF_MODEL, SKEW_SIGMA, WIDTH_SIGMA
+from labrig.fit.spectrum import CurveError
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
+from labrig.optics import CameraResponse, Transmittance
 from labrig.protocols.steps.led_scenes import AGAIN
 from labrig.record import FrameRole
 from labrig.reduce import reduce_patches
@@ -110,7 +116,7 @@ class LitPatch:
 
 
 def lit_patches(
-    part: Part,
+    context: AnalysisContext,
     role: str,
     begin: str,
     lights: Sequence[str],
@@ -139,13 +145,13 @@ def lit_patches(
     DataError
         Frames are missing, damaged, or of another camera than the calibrated one.
     """
-    camera = part.inputs[CAMERA_KIND]
+    camera = context.inputs[CAMERA_KIND]
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
-    lit, left = (_series(part, each, patches) for each in (role, f"{role}-off"))
+    lit, left = (_series(context, each, patches) for each in (role, f"{role}-off"))
     units = [f"{begin}{light}" for light in lights]
     again = None if first is None else (f"{begin}{first}", f"{AGAIN}{first}")
     return {
-        name: _lit_patch(part, series, left[name], units, again, flicker)
+        name: _lit_patch(context, series, left[name], units, again, flicker)
         for name, series in lit.items()
     }
 
@@ -164,22 +170,24 @@ def mean_of(patches: Mapping[str, LitPatch]) -> LitPatch:
     )
 
 
-def _series(part: Part, role: str, patches: Mapping[str, Region] | None) -> dict[str, Series]:
-    run, camera = part.run, part.inputs[CAMERA_KIND]
-    frames = steady_frames(run, part.overrides, role)
+def _series(
+    context: AnalysisContext, role: str, patches: Mapping[str, Region] | None
+) -> dict[str, Series]:
+    run, camera = context.run, context.inputs[CAMERA_KIND]
+    frames = steady_frames(run, context.overrides, role)
     if not frames:
         raise DataError(
             f"{run.folder}: there are no complete '{role}' frames; go on with: labrig resume "
             f"{run.folder}"
         )
     require_calibrated_camera(camera, run, run.frames(role))
-    darks = steady_frames(run, part.overrides, FrameRole.DARK)
-    regions = part.overrides.patches(part.protocol) if patches is None else patches
+    darks = steady_frames(run, context.overrides, FrameRole.DARK)
+    regions = context.overrides.patches(context.protocol) if patches is None else patches
     return reduce_patches(frames, regions, darks, camera=camera)
 
 
 def _lit_patch(
-    part: Part,
+    context: AnalysisContext,
     series: Series,
     left: Series,
     units: Sequence[str],
@@ -192,8 +200,8 @@ def _lit_patch(
     }
     if missing := [unit for unit in units if unit not in lit or unit not in off]:
         raise DataError(
-            f"{part.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
-            f"resume {part.run.folder}"
+            f"{context.run.folder}: the unit '{missing[0]}' is not complete; go on with: labrig "
+            f"resume {context.run.folder}"
         )
     columns = [np.array(column) for column in zip(*(lit[unit] for unit in units), strict=True)]
     offs = [np.array(column) for column in zip(*(off[unit] for unit in units), strict=True)]
@@ -232,3 +240,71 @@ def _ratio(
     relative = weight**2 @ after[1] / numerator**2 + weight**2 @ before[1] / denominator**2
     ratio = numerator / denominator
     return Measured(float(ratio), float(abs(ratio) * np.sqrt(relative)))
+
+
+#: Relative σ of a grey card's reflectance.
+CARD_SIGMA = 0.01
+#: How its reflectance over wavelength differs from the curve of its file: cards age, get dirty, and
+#: differ from one another.
+CARD_COURSE = CurveError(relative=0.01, added=0.0, correlation_nm=100.0)
+#: Relative σ of its reflectance for ultraviolet light relative to the visible: pigments and their
+#: binders begin to absorb there.
+CARD_UV_SIGMA = 0.02
+#: Error of a lamp's spectrum by a file of another lamp of its kind.
+LAMP_ERROR = CurveError(relative=0.08, added=0.01, correlation_nm=40.0)
+#: Least relative σ of a brightness that was calibrated in another run: LEDs age and drift.
+DRIFT = 0.01
+
+
+def exposure_of(light: LedExposure) -> Exposure:
+    """Return a light of unknown brightness, with the errors of its spectrum.
+
+    The shape of one that is nominal is not known either, nor that of a lamp by another one's file.
+    """
+    width, skew = (WIDTH_SIGMA, SKEW_SIGMA) if light.is_nominal else (0.0, 0.0)
+    error = LAMP_ERROR if light.is_lamp else None
+    return Exposure(light.light, 1.0, math.inf, light.wavelength_sigma_nm, width, skew, error)
+
+
+def lit_system(
+    lights: Sequence[LedExposure], camera: CameraResponse, white: Transmittance, card: LitPatch
+) -> FluorescenceSystem:
+    """Return the system of some LEDs, lamps and a camera.
+
+    The card tells the brightness of every light that the camera sees. That of the others follows
+    from a calibration, on whose scale the card puts those that both know.
+
+    Parameters
+    ----------
+    lights
+        LEDs and lamps, with brightnesses on a scale of their own or none.
+    camera, white
+        Curves of the camera, and reflectance of the card.
+    card
+        Values of the card under the lights.
+    """
+    unknown = [exposure_of(led) for led in lights]
+    bare = fluorescence_system(unknown, camera, CURVES_OF_MODEL)
+    by_card = bare.informed_by_white(card.value, card.variance, white, CARD_SIGMA, CARD_COURSE)
+    calibrated = np.array([np.isfinite(led.brightness_sigma) for led in lights])
+    both, missing = calibrated & ~by_card.is_loose, calibrated & by_card.is_loose
+    if not (both.any() and missing.any()):
+        return by_card
+    ratios = by_card.brightness[both] / np.array([led.brightness for led in lights])[both]
+    scale = float(np.median(ratios))
+    scatter = float(np.std(np.log(ratios))) if both.sum() > 1 else 0.0
+    exposures = [
+        replace(
+            exposure,
+            brightness=scale * led.brightness,
+            brightness_sigma=scale
+            * led.brightness
+            * math.hypot(led.brightness_sigma / led.brightness, max(scatter, DRIFT), CARD_UV_SIGMA),
+        )
+        if is_missing
+        else exposure
+        for exposure, led, is_missing in zip(unknown, lights, missing, strict=True)
+    ]
+    return fluorescence_system(exposures, camera, CURVES_OF_MODEL).informed_by_white(
+        card.value, card.variance, white, CARD_SIGMA, CARD_COURSE
+    )

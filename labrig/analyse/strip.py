@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -42,11 +42,11 @@ class StripFrames:
         calibrated one.
     """
 
-    def __init__(self, part: Part) -> None:
-        self._part = part
+    def __init__(self, context: AnalysisContext) -> None:
+        self._part = context
         self.dark = self.of(FrameRole.DARK)
         require_calibrated_camera(
-            part.inputs[CAMERA_KIND], part.run, part.run.frames(FrameRole.DARK)
+            context.inputs[CAMERA_KIND], context.run, context.run.frames(FrameRole.DARK)
         )
 
     def of(self, role: str, unit: str | None = None) -> list[SeriesFrame]:
@@ -126,7 +126,7 @@ class StripPatch:
         return entries.get(self.name)
 
 
-def strip_regions(part: Part) -> list[StripPatch]:
+def strip_regions(context: AnalysisContext) -> list[StripPatch]:
     """Return the patches of a part's protocol, with the user's regions instead.
 
     Raises
@@ -134,10 +134,10 @@ def strip_regions(part: Part) -> list[StripPatch]:
     UsageError
         There is no patch of a name that the user gives a region.
     """
-    protocol = part.protocol
+    protocol = context.protocol
     if not protocol.patches:
         return [StripPatch("", protocol.sample.name)]
-    regions = part.overrides.patches(protocol)
+    regions = context.overrides.patches(protocol)
     alone = len(regions) == 1
     return [
         StripPatch(name, protocol.sample.name if alone else name, region, alone)

@@ -10,9 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from labrig.analyse.clipped_start import LowStart, low_start
-from labrig.analyse.counting_sigma import COUNTS, VarianceOfValue, variance_of_values
 from labrig.analyse.series_fit import fit_series
+from labrig.analyse.table_checks import (
+    COUNTS,
+    LowStart,
+    VarianceOfValue,
+    low_start,
+    variance_of_values,
+)
 from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError, UsageError

@@ -14,19 +14,23 @@ from labrig.acquire import (
     SAMPLE_CHANGER,
     SPECTROMETER,
     Camera,
+    CameraOffers,
     Checkable,
+    ExposureSettings,
     Plan,
     ProtocolModel,
     Rig,
+    RigFile,
     RunObserver,
     Unit,
     lights_that_read_back,
     plan,
     run_units,
 )
-from labrig.bench.camera_checks import LensObserver, require_calibrated_camera
 from labrig.bench.opening import Bench
-from labrig.bench.trial_frame import offers_with_frame_size
+from labrig.bench.run_log import LoggedObserver
+from labrig.bench_optics import calibration
+from labrig.calibration import REFERENCE_KIND, ReferenceFile
 from labrig.foundation.clock import Clock, Interrupted, Slept
 from labrig.foundation.errors import (
     DataError,
@@ -38,9 +42,115 @@ from labrig.foundation.errors import (
     is_memory_shortage,
     memory_shortage,
 )
+from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
-from labrig.record import ActionRecord, RunFolder, RunRecord, damaged_frames
+from labrig.record import ActionRecord, FrameRecord, RunFolder, RunRecord, damaged_frames
+from labrig.reduce import read_exif, read_raw
+
+ANEW = "calibrate the bench with this one (labrig run calibration), or use the other"
+
+
+def require_calibrated_camera(rig: RigFile, devices: dict[str, str]) -> None:
+    """Refuse another camera than that of the rig's calibration.
+
+    Parameters
+    ----------
+    rig
+        The rig file, with the calibrations that were found for it.
+    devices
+        Identities of the connected devices by their keys.
+
+    Raises
+    ------
+    ProtocolError
+        The camera is another one.
+    """
+    reference = calibration(rig, REFERENCE_KIND)
+    camera = devices.get(CAMERA.key)
+    if reference is not None and camera is not None and not reference.is_of(camera):
+        raise ProtocolError(
+            f"expected the calibrated camera, {reference.camera}, got {camera}; {ANEW}"
+        )
+
+
+class LensObserver(LoggedObserver):
+    """Observer that compares the lens of the first frame with that of the rig's calibration.
+
+    Parameters
+    ----------
+    observer
+        Observer for the person at the terminal.
+    rig
+        The rig file, with the calibrations that were found for it.
+    """
+
+    def __init__(self, observer: RunObserver, rig: RigFile) -> None:
+        super().__init__(observer)
+        self._reference: ReferenceFile | None = calibration(rig, REFERENCE_KIND)
+        self._only_warns = "lens" in rig.calibrations.only_warn
+
+    def frame(self, record: FrameRecord) -> None:
+        """Log that a frame was recorded; refuse the first one if it shows another lens.
+
+        Raises
+        ------
+        ProtocolError
+            The lens is another one.
+        """
+        super().frame(record)
+        reference, self._reference = self._reference, None
+        if reference is None or reference.lens is None:
+            return
+        lens = read_exif(read_bytes(record.path, MAX_FRAME_BYTES)).lens
+        if lens is None or lens == reference.lens:
+            return
+        text = f"expected the calibrated lens, {reference.lens}, got {lens}"
+        if not self._only_warns:
+            raise ProtocolError(f"{text}; {ANEW}")
+        self.warn(f"{text}: vignetting and place of the filter may be others")
+
+
+#: Shutter time in seconds at most: the picture does not matter, only its size.
+EXPOSURE_S = 1 / 60
+
+
+def offers_with_frame_size(camera: Camera) -> CameraOffers:
+    """Take a frame, which is not kept, and return the camera's offers with the size of its frames.
+
+    Parameters
+    ----------
+    camera
+        Open camera in its safe state.
+
+    Returns
+    -------
+    CameraOffers
+        Settings that the camera offers; `frame_pixels` is that of the frame.
+
+    Raises
+    ------
+    ProtocolError
+        The rig file gives another size of the frame.
+    FrameError
+        The frame cannot be read.
+    """
+    offers = camera.offers()
+    camera.configure(
+        ExposureSettings(
+            offers.exposure_at_most(EXPOSURE_S), offers.isos[0], max(offers.f_numbers, default=None)
+        )
+    )
+    camera.arm()
+    raw = read_raw(camera.shoot().data, "a trial frame")
+    frame_pixels = (raw.width, raw.height)
+    if offers.frame_pixels is not None and offers.frame_pixels != frame_pixels:
+        raise ProtocolError(
+            f"the rig file expects frames of {list(offers.frame_pixels)} pixels, the camera's have "
+            f"{list(frame_pixels)}; write frame_pixels: {list(frame_pixels)} under 'devices.camera'"
+        )
+    return replace(offers, frame_pixels=frame_pixels)
+
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 
@@ -259,7 +369,7 @@ def _place_sample(name: str | None, rig: Rig, observer: RunObserver) -> None:
     if SAMPLE_CHANGER not in rig or name is None:  # the safe state is that all are in the dark
         return
     changer = rig[SAMPLE_CHANGER]
-    samples = changer.samples()
+    samples = changer.names()
     if name not in samples:
         observer.warn(
             f"the sample changer has no sample '{name}' (it has {', '.join(samples)}): all of them "

@@ -82,7 +82,7 @@ class Recording:
             else FoundCalibrations(rig, {}, ())
         )
         found = found.without_apertures(requested.apertures())
-        protocol = requested.suited_to(found.rig)
+        protocol = requested.resolved_for(found.rig)
         require_optics(found.rig)
         run_plan = _planned(protocol, protocol_path, found.rig, rig_path)
         _require_free_disk(runs, run_plan.size())

@@ -4,7 +4,7 @@ from .compare import (
     PatchComparison as PatchComparison,
     compare_runs as compare_runs,
 )
-from .listing import (
+from .index import (
     RunFilter as RunFilter,
     find_run as find_run,
     list_runs as list_runs,

@@ -1,6 +1,8 @@
-"""The command line; commands import what they need when they are called."""
+"""The command line, and its smallest commands; all import what they need when they are called."""
 
 from functools import cache
+from pathlib import Path
+from typing import Annotated
 
 import typer
 from typer.core import TyperGroup
@@ -8,14 +10,10 @@ from typer.core import TyperGroup
 from labrig.cli import (
     compare,
     design,
-    driver,
-    figures,
     fit,
-    frame,
-    key,
     leds,
     material,
-    optics,
+    page,
     process,
     protocol,
     queue,
@@ -23,11 +21,9 @@ from labrig.cli import (
     rig,
     run,
     runs,
-    schema,
-    sim,
     verify,
-    watch,
 )
+from labrig.cli.completion import complete_run
 from labrig.cli.process_command import ProcessCommand
 
 app = typer.Typer(
@@ -36,31 +32,146 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+optics_app = typer.Typer(help="Curves of cameras, lamps and filters.", no_args_is_help=True)
+sim_app = typer.Typer(help="Simulated devices for other programs.")
+
+
+def frame(
+    file: Annotated[Path, typer.Argument(help="A RAW file: Bayer, X-Trans, no colours.")],
+    roi: Annotated[
+        str | None,
+        typer.Option("--roi", help="x,y,width,height in pixels of the visible frame."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """Mean, uncertainty, scatter, clipped and hot pixels per colour channel of a RAW file."""
+    import json as json_format
+
+    from labrig.foundation.region import parse_region
+    from labrig.reduce import measure, read_raw
+
+    region = None if roi is None else parse_region(roi)
+    measured = measure(read_raw(file), region)
+    if json:
+        typer.echo(json_format.dumps(measured.to_json()))
+    else:
+        typer.echo(str(measured))
+
+
+def figures(
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help="A run folder, the beginning of its name, or 'last'.", autocompletion=complete_run
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="PDF to write, instead of result/figures/figures.pdf of RUN."),
+    ] = None,
+    runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
+) -> None:
+    """Draw all figures of a run's report into one PDF, for print.
+
+    They are drawn from result.json, so that nothing is measured or fitted again.
+    """
+    from labrig.catalogue import find_run
+    from labrig.process import draw_figures
+
+    path, n_pages = draw_figures(find_run(run, runs), out)
+    typer.echo(f"{path}: {n_pages} figures")
+
+
+def schema(
+    kind: Annotated[str, typer.Argument(help="protocol, rig, material, scene or design")],
+) -> None:
+    """Print the JSON Schema of a kind of file, for editors."""
+    import json
+
+    from labrig.schema import schema as schema_of
+
+    typer.echo(json.dumps(schema_of(kind), indent=2))
+
+
+@optics_app.command("show")
+def show_curves(
+    file: Annotated[str, typer.Argument(help="A file of curves, or a shipped camera.")],
+    curve: Annotated[
+        list[str] | None, typer.Option("--curve", help="Name of a curve; may be given again.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="File for a figure (.png, .svg, .pdf).")
+    ] = None,
+) -> None:
+    """What is in a file of measured curves, and how they look."""
+    from labrig.optics import read_checked_curves
+    from labrig.report import describe_curves, draw_curves
+
+    curves = read_checked_curves(file, curve)
+    typer.echo(describe_curves(curves))
+    if picture is not None:
+        draw_curves(curves, picture)
+        typer.echo(f"drawn into {picture}")
+
+
+@optics_app.command("list")
+def list_curves() -> None:
+    """Cameras, colour filters and other curves that are shipped."""
+    from labrig.report import describe_shipped_curves
+
+    typer.echo(describe_shipped_curves())
+
+
+@sim_app.command("camera")
+def serve_simulated_camera(
+    port: Annotated[
+        int,
+        typer.Option("--port", min=0, max=65535, help="TCP port; 0 for any that is free."),
+    ] = 15740,
+    rig: Annotated[
+        str, typer.Option("--rig", help="A shipped simulated rig, or a path to a YAML file.")
+    ] = "sim",
+) -> None:
+    """Serve a simulated rig's camera as PTP/IP on this PC, until Ctrl-C."""
+    from labrig.acquire import read_rig_file
+    from labrig.bench import serve_camera
+    from labrig.foundation import resources
+
+    path = resources.find("config", "rig", rig)
+    serve_camera(read_rig_file(path), str(path), port, typer.echo)
+
+
+@sim_app.callback()
+def simulations() -> None:
+    """Simulated devices for other programs."""
+
+
 app.command("run")(run.run)
 app.command("plan")(run.plan)
 app.command("resume")(run.resume)
 app.command("process", cls=ProcessCommand)(process.process)
-app.command("figures")(figures.figures)
-app.command("frame")(frame.frame)
+app.command("figures")(figures)
+app.command("frame")(frame)
 app.command("compare")(compare.compare)
 app.command("render")(render.render)
 app.command("note")(runs.note)
 app.command("design")(design.design)
 app.command("verify")(verify.verify)
 app.command("seal")(verify.seal)
-app.command("watch")(watch.watch)
-app.command("schema")(schema.schema)
-app.add_typer(driver.app, name="driver")
+app.command("watch")(page.watch)
+app.command("schema")(schema)
+app.add_typer(protocol.driver_app, name="driver")
 app.add_typer(fit.app, name="fit")
-app.add_typer(key.app, name="key")
+app.add_typer(verify.key_app, name="key")
 app.add_typer(leds.app, name="leds")
 app.add_typer(material.app, name="material")
-app.add_typer(optics.app, name="optics")
+app.add_typer(optics_app, name="optics")
 app.add_typer(protocol.app, name="protocol")
 app.add_typer(queue.app, name="queue")
 app.add_typer(rig.app, name="rig")
 app.add_typer(runs.app, name="runs")
-app.add_typer(sim.app, name="sim")
+app.add_typer(sim_app, name="sim")
 
 
 @app.callback(invoke_without_command=True)

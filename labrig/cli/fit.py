@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from labrig.cli.matrices import (
+from labrig.cli.material import (
     LIGHTS,
     Corrected,
     Entry,

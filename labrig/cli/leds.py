@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labrig.cli.matrices import Corrected, checked, read_fractions
+from labrig.cli.material import Corrected, checked, read_fractions
 from labrig.foundation.errors import DataError, UsageError
 
 if TYPE_CHECKING:

@@ -17,6 +17,7 @@ from labrig.record import PERSON, size_text
 if TYPE_CHECKING:
     from labrig.bench import Recording
 
+
 #: Waits that are shorter in all are left out, in seconds.
 SHORT_S = 60.0
 #: A number with its unit, which are not parted by the end of a line.

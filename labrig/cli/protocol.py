@@ -1,4 +1,4 @@
-"""`labrig protocol`: shipped protocols, and copies of them to be edited."""
+"""`labrig protocol` and `labrig driver`: shipped protocols, copies to be edited, new packages."""
 
 from itertools import takewhile
 from pathlib import Path
@@ -121,3 +121,29 @@ def _new_file(name: str, path: Path) -> None:
 @app.callback()
 def protocols() -> None:
     """The protocols that can be run."""
+
+
+driver_app = typer.Typer(help="Drivers of devices that labrig does not have.")
+
+
+@driver_app.callback()
+def drivers() -> None:
+    """Drivers of devices that labrig does not have."""
+
+
+@driver_app.command("new")
+def new_driver(
+    name: Annotated[str, typer.Argument(help="Name of the driver, such as 'my_board'.")],
+    folder: Annotated[
+        Path | None, typer.Argument(help="New folder of the package.", show_default="./NAME")
+    ] = None,
+) -> None:
+    """Create a package with a commented driver and its test; nothing is overwritten.
+
+    A board that reads and answers lines needs none: see the driver 'serial_relay'.
+    """
+    from labrig.package_template import create_package
+
+    path = folder or Path(name)
+    create_package("driver", name, path)
+    typer.echo(f'{path} is yours to change; then: pip install -e "{path.resolve()}[test]"')

@@ -14,7 +14,7 @@ from labrig.foundation.named_files import beside, is_path
 if TYPE_CHECKING:
     from labrig.acquire import RigFile
     from labrig.bench import Recording, Watch
-    from labrig.cli.prompt import Terminal
+    from labrig.cli.progress import Terminal
     from labrig.queue import QueuedRun, QueueEntry
 
 app = typer.Typer(help="Measurements one after another.", no_args_is_help=True)
@@ -102,7 +102,7 @@ def run(
     ] = False,
 ) -> None:
     """Measure what is waiting or was interrupted. The last line is the page of results."""
-    from labrig.cli.prompt import Terminal
+    from labrig.cli.progress import Terminal
     from labrig.queue import run_queue
 
     typer.echo(run_queue(queue, runs, _Person(queue, runs, Terminal(), yes, verbose)))

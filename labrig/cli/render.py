@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, TextIO, cast
 
 import typer
 
-from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.completion import complete_scene
+from labrig.cli.exit_codes import DetachableStream
 
 if TYPE_CHECKING:
     from rich.progress import Progress

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labrig.cli import default_rig, view
-from labrig.cli.closed_pipe import DetachableStream
+from labrig.cli import default_rig, page
 from labrig.cli.default_rig import RigArgument, rig_path
+from labrig.cli.exit_codes import DetachableStream
 from labrig.foundation.errors import DeviceError, ProtocolError
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def check(
     _raise_failures(report, path)
 
 
-app.command("view")(view.view)
+app.command("view")(page.view)
 app.command("use")(default_rig.use)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from labrig.acquire import read_rig_file
 from labrig.bench_optics import with_shipped_camera
-from labrig.compare.dark_room_view import (
+from labrig.compare.photographed_room import (
     DarkRoomScene,
     fractions_of,
     picture_of,

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.compare.dark_room_view import DarkRoomScene
 from labrig.compare.glow import RGB
 from labrig.compare.lamp_bench import LampBench, LitSamples, lit_by_all
+from labrig.compare.photographed_room import DarkRoomScene
 from labrig.compare.run import measured_camera
 from labrig.compare.viewing import DEFAULT_WHITE, Viewing, viewing
 from labrig.foundation.arrays import FloatArray

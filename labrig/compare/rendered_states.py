@@ -6,9 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.compare.dark_room_view import DarkRoomScene, picture_of, rendered_light
 from labrig.compare.glow import predicted_by
-from labrig.compare.photographed_room import PhotographedRoom, ReflectedLight
+from labrig.compare.photographed_room import (
+    DarkRoomScene,
+    PhotographedRoom,
+    ReflectedLight,
+    picture_of,
+    rendered_light,
+)
 from labrig.compare.run import MeasuredPatch
 from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray

@@ -1,18 +1,15 @@
-from .appearance import (
-    key_differences as key_differences,
-)
 from .bands import (
     RGB_TO_Y as RGB_TO_Y,
+    Conversion as Conversion,
     DesignBands as DesignBands,
+    smooth_spectrum as smooth_spectrum,
     spectral_bands as spectral_bands,
     three_bands as three_bands,
 )
 from .by_hand import (
     Parameters as Parameters,
     judge as judge,
-)
-from .conversion import (
-    Conversion as Conversion,
+    preset_parameters as preset_parameters,
 )
 from .determined import (
     Conflict as Conflict,
@@ -36,16 +33,15 @@ from .nearest import (
     nearest_materials as nearest_materials,
     presets as presets,
 )
-from .preset import (
-    preset_parameters as preset_parameters,
-)
 from .propagation import (
     Reach as Reach,
+    SpreadWish as SpreadWish,
     propagate as propagate,
 )
 from .result import (
     Design as Design,
     Impossible as Impossible,
+    key_differences as key_differences,
 )
 from .scene_design import (
     SceneDesign as SceneDesign,
@@ -58,9 +54,6 @@ from .scene_light import (
 from .scene_spectra import (
     SceneSpectra as SceneSpectra,
 )
-from .smooth_spectrum import (
-    smooth_spectrum as smooth_spectrum,
-)
 from .solver import (
     solve as solve,
 )
@@ -68,9 +61,6 @@ from .spread_design import (
     SpreadDesign as SpreadDesign,
     Spreading as Spreading,
     solve_spread as solve_spread,
-)
-from .spread_wish import (
-    SpreadWish as SpreadWish,
 )
 from .wish_file import (
     LightChange as LightChange,

@@ -3,19 +3,92 @@
 Light is measured in units of one white: a perfect diffuser under D65 of irradiance 1 has the colour
 (1, 1, 1) in linear sRGB, and the radiance E/π in every band. Three bands are the channels of linear
 sRGB, as in section 6 of Nalbach et al.; spectral bands hold means over wavelengths.
+
+Many spectra have one colour. Of those on a grid the one of least squared second differences is
+taken (Smits, *An RGB-to-spectrum conversion for reflectances*, 1999, takes first differences of
+reflectances). It is a choice, no measurement.
+
+Three channels stand for the smoothest non-negative spectra: a light of one linear sRGB is the sum
+of the smoothest spectra of the primaries, and Λ, k_e and albedo are the smoothest that do the same
+under it.
 """
 
 import itertools
+import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import lsq_linear
 
-from labrig.design.smooth_spectrum import PRIMARIES_NM, primary_spectra
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.optics import CIE_1931, Spectrum, band_integrals, band_means, illuminant, observer
+
+#: Grid of the primaries' spectra, over which the observer sees.
+PRIMARIES_NM = np.arange(390.0, 721.0, 5.0)
+#: Weight of the colour over that of smoothness.
+COLOUR_WEIGHT = 1e4
+#: Error of a colour, relative to its luminance, up to which a spectrum is said to have it.
+SAME_COLOUR = 2e-3
+
+XYZ_OF_RGB = np.array(
+    [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+)
+
+
+def smooth_spectrum(rgb: FloatArray, colours_of_bands: FloatArray) -> FloatArray:
+    """Return the smoothest non-negative spectrum of a colour.
+
+    Parameters
+    ----------
+    rgb
+        Colour in linear sRGB, shape (3,), or other sums over the bands, shape (n,); negative values
+        are outside of sRGB, but may be seen.
+    colours_of_bands
+        Linear sRGB of light by its bands, shape (3, bands) or (n, bands).
+
+    Returns
+    -------
+    ndarray
+        Light in each band, ≥ 0, shape (bands,); of a colour that no light has, that of the nearest.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.design import smooth_spectrum, spectral_bands
+    >>> bands = spectral_bands(np.linspace(400.0, 700.0, 13))
+    >>> spectrum = smooth_spectrum(np.array([0.1, 0.6, 0.2]), bands.to_rgb)
+    >>> (bands.to_rgb @ spectrum).round(3).tolist(), bool(spectrum.min() >= 0)
+    ([0.1, 0.6, 0.2], True)
+    """
+    n = colours_of_bands.shape[1]
+    scale = float(np.abs(rgb).max(initial=0.0))
+    if scale == 0:
+        return np.zeros(n)
+    # Bands where the eye is blind end in darkness, or a spectrum would go on for ever.
+    padded = np.eye(n + 2)[:, 1:-1]
+    bends = np.diff(padded, 2, axis=0) if n > 1 else np.zeros((0, n))
+    unit = np.linalg.norm(colours_of_bands)
+    weight = COLOUR_WEIGHT / unit
+    system = np.vstack([weight * colours_of_bands * n, bends])
+    target = np.concatenate([weight * rgb * n / scale, np.zeros(len(bends))])
+    return scale * nonnegative_least_squares(system, target)
+
+
+@cache
+def primary_spectra() -> tuple[FloatArray, ...]:
+    """Return the smoothest spectra of red, green and blue of linear sRGB on `PRIMARIES_NM`."""
+    eye = observer(CIE_1931)
+    step = PRIMARIES_NM[1] - PRIMARIES_NM[0]
+    functions = np.stack(
+        [np.interp(PRIMARIES_NM, eye.wavelength_nm, each) for each in eye.functions.T]
+    )
+    colours = np.linalg.solve(XYZ_OF_RGB, functions * step)
+    return tuple(smooth_spectrum(primary, colours) for primary in np.eye(3))
+
 
 #: CIE XYZ to linear sRGB, IEC 61966-2-1.
 XYZ_TO_RGB = np.array(
@@ -162,3 +235,89 @@ def _d65_power() -> float:
     eye, light = observer(CIE_1931), illuminant("D65")
     luminance = light.at(eye.wavelength_nm) @ eye.functions[:, 1]
     return float(np.trapezoid(light.value, light.wavelength_nm) / luminance)
+
+
+#: Lights under which a reflectance is to look as its three channels.
+MOST_LIGHTS = 40
+#: Weight of a reflectance's second differences over that of its colours.
+SMOOTHNESS = 3e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """From the bands of a design to bands of wavelengths.
+
+    Attributes
+    ----------
+    bands
+        Bands of the design.
+    edges_nm
+        Edges of the bands of wavelengths in nm, shape (n + 1,).
+    """
+
+    bands: DesignBands
+    edges_nm: FloatArray
+
+    @classmethod
+    def to(cls, bands: DesignBands, edges_nm: ArrayLike) -> "Conversion":
+        """Return the conversion to bands with edges in nm."""
+        return cls(bands, np.asarray(edges_nm, dtype=np.float64))
+
+    @cached_property
+    def of_light(self) -> FloatArray:
+        """Light in bands of wavelengths by that of the design, shape (n, bands)."""
+        if self.bands.edges_nm is None:
+            spectra = np.stack(primary_spectra(), axis=1)
+            return band_means(PRIMARIES_NM, spectra, self.edges_nm)
+        low = np.maximum(self.edges_nm[:-1, np.newaxis], self.bands.edges_nm[:-1])
+        high = np.minimum(self.edges_nm[1:, np.newaxis], self.bands.edges_nm[1:])
+        return np.asarray(np.maximum(high - low, 0) / np.diff(self.edges_nm)[:, np.newaxis])
+
+    @cached_property
+    def to_rgb(self) -> FloatArray:
+        """Linear sRGB of light by bands of wavelengths, shape (3, n)."""
+        return spectral_bands(self.edges_nm).to_rgb
+
+    def light(self, light: FloatArray) -> FloatArray:
+        """Return irradiance or radiance (…, bands) in bands of wavelengths (…, n)."""
+        return np.asarray(light @ self.of_light.T)
+
+    def strongest_light(self, light: FloatArray) -> FloatArray:
+        """Return the strongest of some irradiances (…, bands) in bands of wavelengths (n,)."""
+        lights = self.light(light).reshape(-1, len(self.of_light))
+        return np.asarray(lights[int(np.linalg.norm(lights, axis=1).argmax())])
+
+    def emission(self, emitted: FloatArray) -> FloatArray:
+        """Return Λ (bands,) in bands of wavelengths (n,)."""
+        if self.bands.edges_nm is None:
+            return smooth_spectrum(emitted, self.to_rgb)
+        return self.light(emitted)
+
+    def excitation(self, k_e: FloatArray) -> FloatArray:
+        """Return excitation rates (bands,) in bands of wavelengths (n,), the same κ in sum."""
+        if self.bands.edges_nm is None:
+            return smooth_spectrum(k_e, self.of_light.T)
+        widths = np.diff(self.bands.edges_nm)
+        return np.asarray((k_e / widths) @ self.of_light.T * np.diff(self.edges_nm))
+
+    def albedo(self, albedo: FloatArray, lights: FloatArray) -> FloatArray:
+        """Return reflectances (bands,) in bands of wavelengths (n,), 0 to 1.
+
+        Of three channels it is the smoothest that reflects the colours which the channels would,
+        under all of the lights (m, bands) as nearly as one can.
+        """
+        if self.bands.edges_nm is None:
+            lit = np.unique(lights[lights.any(axis=1)], axis=0)
+            lit = lit[:: math.ceil(len(lit) / MOST_LIGHTS) or 1]
+            lit = lit / lit.max(axis=1, keepdims=True, initial=1e-300)
+            seen = np.concatenate([self.to_rgb * light for light in self.light(lit)])
+            return smooth_reflectance((albedo * lit).ravel(), seen)
+        covered = np.maximum(self.of_light.sum(axis=1), 1e-300)
+        return np.asarray(np.minimum(self.light(albedo) / covered, 1.0))
+
+
+def smooth_reflectance(wanted: FloatArray, seen: FloatArray, highest: float = 1.0) -> FloatArray:
+    """Return the smooth reflectance from 0 on (n,) that is seen (m, n) as is wanted (m,)."""
+    bends = SMOOTHNESS * np.diff(np.eye(seen.shape[1]), 2, axis=0)
+    system, target = np.vstack([seen, bends]), np.concatenate([wanted, np.zeros(len(bends))])
+    return np.asarray(lsq_linear(system, target, (0.0, highest)).x)

@@ -10,10 +10,33 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from labrig.design.efficiency import emitted_over_absorbed
 from labrig.design.linear_part import Coefficients
 from labrig.design.search import Found, Problem
 from labrig.foundation.arrays import FloatArray
+
+
+def emitted_over_absorbed(
+    k_e: FloatArray, reradiation: FloatArray, albedo: FloatArray, energy: FloatArray
+) -> FloatArray:
+    """Return what weak light of each band makes emit over what is absorbed of it, shape (bands,).
+
+    A state that is empty captures at the rate κ, and in the end gives back π Λ κ, over all bands.
+
+    Parameters
+    ----------
+    k_e, reradiation
+        Excitation rates and Λ, shape (states, bands).
+    albedo
+        Albedo, shape (bands,).
+    energy
+        Energy of the unit of light in every band, shape (bands,).
+    """
+    emitted = np.pi * (reradiation @ energy) @ k_e
+    absorbed = (1 - albedo) * energy
+    ratio = np.full_like(emitted, np.inf)
+    np.divide(emitted, absorbed, out=ratio, where=absorbed > 0)
+    return np.where(emitted > 0, ratio, 0.0)
+
 
 #: Searches for the nearest material that keeps the energy, and evaluations of each.
 SEARCHES, EVALUATIONS = 4, 40

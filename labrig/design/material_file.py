@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from labrig.design.conversion import Conversion
+from labrig.design.bands import Conversion
 from labrig.design.light import LightProgramme
 from labrig.design.nearest import material_radiance
 from labrig.design.result import Design

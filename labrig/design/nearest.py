@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.design.conversion import Conversion
+from labrig.design.bands import Conversion
 from labrig.design.glow import emission
 from labrig.design.light import LightProgramme, steps_to
 from labrig.design.result import Design

@@ -5,10 +5,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from labrig.design.bands import RGB_TO_Y
+from labrig.design.bands import RGB_TO_Y, XYZ_OF_RGB, smooth_spectrum
 from labrig.design.light import LightProgramme
 from labrig.design.result import Design, Impossible
-from labrig.design.smooth_spectrum import XYZ_OF_RGB, smooth_spectrum
 from labrig.foundation.arrays import FloatArray
 
 #: Relative excess that counts as rounding of the keys.

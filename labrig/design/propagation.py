@@ -1,4 +1,4 @@
-"""Edits of a few texels, spread over a texture of parameters by appearance and position.
+"""Materials of dots, spread over a texture of parameters by appearance and position.
 
 After X. An and F. Pellacini, *AppProp: all-pairs appearance-space edit propagation* (2008), and
 F. Pellacini and J. Lawrence, *AppWand: editing measured materials using appearance-driven
@@ -9,19 +9,27 @@ optimization* (2007): the new values e of all texels minimise
 
 over the nearest neighbours j of each texel i in appearance f and position x. Rates are edited as
 logarithms.
+
+Spreading edits is linear in them, so that how far one dot reaches is found by spreading 1 from its
+brush and 0 from all others'. Dots have their own material exactly: the parts are combined so that
+each dot's is 1 at itself and 0 at the others.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import LinearOperator, cg
 from scipy.spatial import cKDTree
 
-from labrig.foundation.arrays import FloatArray
+from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.models import FrozenModel, Positive, UnitFraction
 
 #: Neighbours of each texel.
 NEIGHBOURS = 10
@@ -199,3 +207,96 @@ def _checked(
     if not (reach.appearance > 0 and reach.position > 0):
         raise UsageError("expected a reach above 0 in appearance and position, got others")
     return rows, columns
+
+
+#: Part of the picture's height that a stroke is wide at most.
+WIDEST = 1.0
+
+
+class SpreadWish(FrozenModel):
+    """How far materials reach around the dots whose own they are.
+
+    Attributes
+    ----------
+    position
+        Distance in texels over which neighbours are alike.
+    appearance
+        Difference of colours, 0 to 1 in each channel of a picture, over which texels are alike.
+    brush
+        Distance in texels from a dot up to which the material is the dot's; at twice the distance
+        nothing holds it.
+    appearance_file
+        Picture whose colours say what is alike, upper left where u is 0 and v is 1, its path
+        relative to this file. Without it only the material of a `material_map` does.
+    strokes
+        Where else the material is that of a dot, by the dot's name: strokes of a brush on the
+        picture, each x, y and radius; x and y as of `pixels`, the radius as a part of its height.
+    """
+
+    position: Annotated[Positive, Field(le=1e4)] = 20.0
+    appearance: Annotated[Positive, Field(le=1e4)] = 0.1
+    brush: Annotated[Positive, Field(le=1e4)] = 2.0
+    appearance_file: Annotated[str, Field(min_length=1)] | None = None
+    strokes: dict[
+        str, tuple[tuple[UnitFraction, UnitFraction, Annotated[float, Field(gt=0, le=WIDEST)]], ...]
+    ] = Field(default_factory=dict)
+
+    @property
+    def reach(self) -> Reach:
+        """Differences over which texels are alike."""
+        return Reach(self.appearance, self.position)
+
+
+def dot_shares(
+    appearance: FloatArray,
+    dots: Sequence[tuple[int, int]],
+    painted: Sequence[BoolArray],
+    wish: SpreadWish,
+) -> FloatArray:
+    """Return the part of each dot in the material of each texel.
+
+    Parameters
+    ----------
+    appearance
+        Colours of the texels, shape (rows, columns, n).
+    dots
+        Row and column of each dot, no two alike.
+    painted
+        Whether a stroke for each dot covers a texel, shape (rows, columns) each.
+    wish
+        How far dots reach.
+
+    Returns
+    -------
+    ndarray
+        Parts from 0 to 1, in sum at most 1: the rest is the material of all dots together; shape
+        (rows, columns, dots).
+    """
+    own = _brushes(appearance.shape[:2], dots, painted, wish.brush)
+    weights = own.max(axis=-1)
+    is_dots = (np.arange(len(dots)) == own.argmax(axis=-1)[..., np.newaxis]).astype(np.float64)
+    nothing = np.zeros_like(is_dots)
+    reached = propagate(nothing, appearance, is_dots, weights, wish.reach)
+    rows, columns = np.array(dots).T
+    # Dots so near that none is told from the other share what they cannot have alone.
+    exact = reached @ np.linalg.pinv(reached[rows, columns])
+    shares = np.clip(exact, 0.0, 1.0)
+    return np.asarray(shares / np.maximum(shares.sum(axis=-1, keepdims=True), 1.0))
+
+
+def _brushes(
+    shape: tuple[int, ...],
+    dots: Sequence[tuple[int, int]],
+    painted: Sequence[BoolArray],
+    brush: float,
+) -> FloatArray:
+    """Return the weight of each dot's brush and strokes, shape (rows, columns, dots)."""
+    row, column = np.indices(shape[:2])
+    distance = np.stack([np.hypot(row - own[0], column - own[1]) for own in dots], axis=-1)
+    around = np.clip(2 - distance / brush, 0.0, 1.0)
+    # A dot's next surroundings are its own, whatever is painted over them; of two dots they are
+    # those of the nearer one.
+    is_nearest = distance.argmin(axis=-1)[..., np.newaxis] == np.arange(len(dots))
+    around = np.where(is_nearest, around, 0.0)
+    strokes = np.stack(painted, axis=-1) & (around.max(axis=-1, keepdims=True) < 1)
+    return np.asarray(np.maximum(around, strokes), dtype=np.float64)

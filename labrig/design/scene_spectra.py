@@ -11,10 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.design.bands import INVISIBLE, RGB_TO_Y, DesignBands, spectral_bands
-from labrig.design.conversion import Conversion, smooth_reflectance
+from labrig.design.bands import (
+    INVISIBLE,
+    RGB_TO_Y,
+    Conversion,
+    DesignBands,
+    smooth_reflectance,
+    smooth_spectrum,
+    spectral_bands,
+)
 from labrig.design.light import LightProgramme
-from labrig.design.smooth_spectrum import smooth_spectrum
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.optics import photopic_efficacy

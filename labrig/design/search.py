@@ -17,10 +17,16 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter
 from scipy.optimize import minimize
 
-from labrig.design.descent import Curvature, descend
 from labrig.design.glow import Emission, emission, grid_emission
 from labrig.design.light import LightProgramme, Steps, steps_to
-from labrig.design.linear_part import BandByBand, Coefficients, LinearPart, Wanted
+from labrig.design.linear_part import (
+    BandByBand,
+    Coefficients,
+    Curvature,
+    LinearPart,
+    Wanted,
+    descend,
+)
 from labrig.fit import Ending, LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.material import MAX_ORDER

@@ -13,10 +13,10 @@ from pydantic import Field, model_validator
 from labrig.design.bands import XYZ_TO_RGB, DesignBands, spectral_bands, three_bands
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme
+from labrig.design.propagation import SpreadWish
 from labrig.design.result import Design
 from labrig.design.search import PREFERENCE
 from labrig.design.solver import KEY_SIGMA, MOST_STATES, solve
-from labrig.design.spread_wish import SpreadWish
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive, UnitFraction

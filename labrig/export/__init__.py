@@ -1,7 +1,8 @@
-"""Exports of runs and results to NeXus, xarray and Tiled."""
+"""Exports of runs and results to NeXus, xarray and Tiled.
 
-from labrig.export.dataset import read_dataset, tree_of
-from labrig.export.nexus import write_nexus
-from labrig.export.tiled import to_tiled
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = ["read_dataset", "to_tiled", "tree_of", "write_nexus"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 
 from labrig.fit.crossing import forecast_crossing
-from labrig.fit.least_squares import least_squares
+from labrig.fit.nonlinear_least_squares import least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.quantity import duration_text

@@ -50,6 +50,7 @@ from .rates import (
     phi1 as phi1,
     phi2 as phi2,
     relaxation_with_slopes as relaxation_with_slopes,
+    self_excitation as self_excitation,
 )
 from .reradiation import (
     REFERENCE_Y as REFERENCE_Y,
@@ -81,7 +82,4 @@ from .reradiation import (
     without_offset as without_offset,
     without_spill as without_spill,
     write_reradiation as write_reradiation,
-)
-from .self_excitation import (
-    self_excitation as self_excitation,
 )

@@ -13,8 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
-from labrig.optics.ordinate import Quantity
-from labrig.optics.spectral_axis import PLAUSIBLE_NM
+from labrig.optics.spectral_columns import PLAUSIBLE_NM, Quantity
 from labrig.text_table import plain_text
 
 #: Wavelengths, values and σ of a curve.

@@ -1,8 +1,8 @@
-"""Prediction of a protocol's uncertainties, and of changes that would halve them."""
+"""Prediction of a protocol's uncertainties, and of changes that would halve them.
 
-from labrig.predict.assumptions import Sources
-from labrig.predict.patch import PatchPrediction
-from labrig.predict.prediction import Prediction, predict
-from labrig.predict.remedies import Remedy
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = ["PatchPrediction", "Prediction", "Remedy", "Sources", "predict"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

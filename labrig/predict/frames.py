@@ -8,8 +8,7 @@ from scipy.special import ndtr
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.region import Region
 from labrig.predict.camera import CameraFigures
-from labrig.predict.glow import Glow
-from labrig.predict.state_means import state_means
+from labrig.predict.glow import Glow, state_means
 from labrig.reduce import (
     ChannelStats,
     FrameMeasurement,

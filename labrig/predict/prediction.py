@@ -1,15 +1,128 @@
 """Predicted uncertainties of a protocol's fits, and changes that would reduce them."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from labrig.acquire import Plan, ProtocolModel, RigFile
+import numpy as np
+from pydantic import ValidationError
+
+from labrig.acquire import Plan, ProtocolModel, RigFile, plan
+from labrig.foundation.errors import UsageError
 from labrig.predict.assumptions import Sources, collect_assumptions
-from labrig.predict.expectation import expect, predictable
+from labrig.predict.expectation import Bench, expect, predictable
 from labrig.predict.patch import PatchPrediction, predicted_patches
-from labrig.predict.remedies import Remedy, Trials
-from labrig.predict.variants import changes
+from labrig.predict.variants import Change, changed, changes
+
+#: Largest ratio of σ after over before a change that helps.
+HELPS = 0.95
+#: Ratio that counts as half: dark frames are shared, so that 4 decays fall just short of it.
+HALF = 0.52
+#: Largest number of combined changes, and fraction of the lab time up to which one is cheap.
+MAX_TOGETHER = 3
+CHEAP = 0.1
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """A change of the protocol with its effect and cost.
+
+    Attributes
+    ----------
+    change
+        Change of the protocol.
+    patches
+        Predictions by patch after the change.
+    gain
+        σ of the rates after over before the change, geometric mean over all rates.
+    extra_time_s
+        Additional lab time in seconds.
+    """
+
+    change: Change
+    patches: Mapping[str, PatchPrediction]
+    gain: float
+    extra_time_s: float
+
+    @property
+    def helps(self) -> bool:
+        """Whether the change reduces σ noticeably."""
+        return self.gain <= HELPS
+
+    @property
+    def halves(self) -> bool:
+        """Whether the change halves σ."""
+        return self.gain <= HALF
+
+
+@dataclass(frozen=True)
+class Trials:
+    """A protocol on a bench and its prediction, with which changes are compared."""
+
+    protocol: ProtocolModel
+    rig: RigFile
+    source: str
+    bench: Bench
+    base: Mapping[str, PatchPrediction]
+    duration_s: float
+
+    def remedies(self, candidates: Iterable[Change]) -> tuple[Remedy, ...]:
+        """Return the feasible changes and some combinations of them, the largest gain first."""
+        single = [
+            remedy for candidate in candidates if (remedy := self.remedy(candidate)) is not None
+        ]
+        single.sort(key=lambda remedy: remedy.gain)
+        cheap = [remedy for remedy in single if remedy.extra_time_s <= CHEAP * self.duration_s]
+        by_name = {
+            remedy.change.description: remedy for remedy in (*single, *self._combined(cheap))
+        }
+        if not any(remedy.halves for remedy in by_name.values()):
+            by_name |= {remedy.change.description: remedy for remedy in self._combined(single)}
+        return tuple(sorted(by_name.values(), key=lambda remedy: remedy.gain))
+
+    def remedy(self, change: Change) -> Remedy | None:
+        """Return the effect of a change; None if camera, frame or timing do not allow it."""
+        try:
+            variant = changed(self.protocol, change.keys)
+            laid_out = plan(variant, self.rig, self.source)
+            patches = predicted_patches(expect(predictable(variant), laid_out.offers, self.bench))
+        except (ValidationError, UsageError):
+            return None
+        return Remedy(
+            change,
+            patches,
+            _geometric_mean_ratio(_rate_sigmas(patches), _rate_sigmas(self.base)),
+            laid_out.duration_s - self.duration_s,
+        )
+
+    def _combined(self, remedies: Sequence[Remedy]) -> list[Remedy]:
+        """Return the best combination of changes, added until σ is halved; empty for one change."""
+        helpful = [remedy for remedy in remedies if remedy.helps]
+        if not helpful:
+            return []
+        combined, n_changes = helpful[0], 1
+        for remedy in helpful[1:]:
+            if combined.halves or n_changes == MAX_TOGETHER:
+                break
+            if remedy.change.contradicts(combined.change):
+                continue
+            trial = self.remedy(combined.change & remedy.change)
+            if trial is not None and trial.gain <= HELPS * combined.gain:
+                combined, n_changes = trial, n_changes + 1
+        return [combined] if n_changes > 1 else []
+
+
+def _rate_sigmas(patches: Mapping[str, PatchPrediction]) -> list[float]:
+    return [sigma for patch in patches.values() for sigma in patch.rate_sigma_per_s]
+
+
+def _geometric_mean_ratio(after: Sequence[float], before: Sequence[float]) -> float:
+    """Return the geometric mean of ratios of σ; a σ that remains infinite counts as unchanged."""
+    ratios = [
+        new / old if np.isfinite(old) else float(not np.isfinite(new)) or 1e-3
+        for new, old in zip(after, before, strict=True)
+    ]
+    return float(np.exp(np.mean(np.log(ratios))))
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from labrig.foundation.arrays import FloatArray
 from labrig.predict.frames import ExpectedFrames
-from labrig.predict.glow import Glow
-from labrig.predict.state_means import StateMeans, state_means
+from labrig.predict.glow import Glow, StateMeans, state_means
 from labrig.reduce import TWO_DEGREES, fit_dark
 
 PHOTONS, READING, FLICKER, DARK = "photons", "reading", "flicker", "dark"

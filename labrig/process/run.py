@@ -7,9 +7,9 @@ from pathlib import Path
 
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import (
+    AnalysisContext,
     Inputs,
     Overrides,
-    Part,
     check_options,
     clock_warnings,
     read_run_protocol,
@@ -214,7 +214,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     require_recorded_settings(run, overrides.bench(folder), overrides)
     analyse = measurement(protocol.protocol, str(folder)).load("analysis")
     inputs = Inputs.of(rig)
-    part = Part(run, protocol, rig, overrides, inputs)
+    part = AnalysisContext(run, protocol, rig, overrides, inputs)
     result: RunResult = analyse(part)
     lvf = inputs.updated_by(result)[LVF_KIND]
     camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)

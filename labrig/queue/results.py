@@ -17,11 +17,45 @@ from labrig.fit import fit_power_law
 from labrig.foundation.errors import FitError, LabrigError
 from labrig.foundation.quantity import duration_text
 from labrig.process import describe_without_run, write_with_report
-from labrig.queue.luminances import FoundLuminance, found_luminances
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
 from labrig.results import MCD_PER_M2, Measured, read_fitted_decay, read_result
 from labrig.text_table import table_text
+
+
+@dataclass(frozen=True)
+class FoundLuminance:
+    """A luminance at one time after lamp off.
+
+    Attributes
+    ----------
+    patch
+        Name of the patch.
+    t_s
+        Time after lamp off in seconds.
+    luminance
+        Luminance in mcd/m².
+    scale_sigma
+        Part of its relative σ that luminances of one bench have in common.
+    """
+
+    patch: str
+    t_s: float
+    luminance: Measured
+    scale_sigma: float
+
+
+def found_luminances(run: Path) -> Iterator[FoundLuminance]:
+    """Iterate over the luminances of a processed run; none of a run of another protocol."""
+    try:
+        result = read_result(run)
+    except LabrigError:
+        return
+    for name, decay in result.provides().get("luminances", {}).items():
+        for entry in decay.at:
+            if entry.luminance is not None:
+                yield FoundLuminance(name, entry.t_s, entry.luminance, decay.scale_sigma)
+
 
 #: Name of the figure, what it shows, label of its axis, and the quantity.
 SWEPT: tuple[tuple[str, str, str, Callable[["FoundState"], Measured]], ...] = (

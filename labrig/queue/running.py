@@ -124,9 +124,8 @@ def _on_changer(recording: Recording) -> Sequence[str]:
     """Return the samples that the rig's sample changer brings by itself."""
     if SAMPLE_CHANGER.key not in recording.rig.devices:
         return ()
-    driver, settings = driver_and_settings(recording.rig, SAMPLE_CHANGER.key, recording.rig.name)
-    samples: Sequence[str] = driver.declared_samples(settings)
-    return samples
+    _, settings = driver_and_settings(recording.rig, SAMPLE_CHANGER.key, recording.rig.name)
+    return tuple(settings.samples)
 
 
 def _prepared(path: Path, entry: QueueEntry, attendant: Attendant) -> Recording:

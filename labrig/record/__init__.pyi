@@ -6,6 +6,7 @@ from .checksums import (
     FRAMES as FRAMES,
     damaged_frames as damaged_frames,
     discard_cache as discard_cache,
+    own_digest as own_digest,
 )
 from .frames import (
     CLOCK_STEPPED as CLOCK_STEPPED,
@@ -44,19 +45,15 @@ from .journal import (
     read_notes as read_notes,
     sealed_line as sealed_line,
 )
-from .made import (
-    time_made as time_made,
-)
 from .plain_folder import (
     require_plain_folder as require_plain_folder,
 )
 from .run_folder import (
     CALIBRATIONS_FILE as CALIBRATIONS_FILE,
-    RunFolder as RunFolder,
-)
-from .run_lock import (
     RECORDING_LOCK as RECORDING_LOCK,
+    RunFolder as RunFolder,
     RunLock as RunLock,
+    time_made as time_made,
 )
 from .run_record import (
     Attempt as Attempt,
@@ -66,7 +63,4 @@ from .run_record import (
 from .run_size import (
     RunSize as RunSize,
     size_text as size_text,
-)
-from .user_secret import (
-    own_digest as own_digest,
 )

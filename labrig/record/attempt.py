@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from labrig.foundation.output_file import Disk, write_durably
-from labrig.record.document_checks import VALUES, described
 from labrig.record.frames import (
     ActionRecord,
     FrameRecord,
     SpectrumRecord,
     TemperatureRecord,
 )
-from labrig.record.journal import Journal
+from labrig.record.journal import VALUES, Journal, described
 
 
 class AttemptWriter:

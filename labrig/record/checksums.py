@@ -3,23 +3,80 @@
 That a frame has the checksum of its journal is noted with the size and the modification time of its
 file. As long as both stay the same, the file is trusted and not read. A note by another user or
 another PC does not count.
+
+What was reduced from frames lies in the run folder, which may come from somebody else. A digest
+with a secret of this user shows that this user's own labrig has written it.
 """
 
+import hmac
 import json
 import os
+import secrets
 import shutil
+import stat
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from hashlib import file_digest
+from functools import cache
+from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import TypeVar
 
 from labrig.foundation.errors import DiskError, LabrigError
 from labrig.foundation.input_file import MAX_JSON_BYTES, open_regular, read_text
-from labrig.foundation.output_file import make_folder_in, write_durably
+from labrig.foundation.output_file import make_folder_in, write_durably, write_private
 from labrig.record.frames import FileRecord
-from labrig.record.user_secret import own_digest
+
+_FOLDER, _FILE = "labrig", "kept_numbers_key"
+_BYTES = 32
+
+
+def own_digest(content: bytes) -> str:
+    """Return the HMAC-SHA256 of a content by the secret of this user.
+
+    Parameters
+    ----------
+    content
+        Content of a file.
+
+    Returns
+    -------
+    str
+        Digest in hexadecimal digits. Where no secret can be kept, it is another one in each
+        process.
+
+    Examples
+    --------
+    >>> from labrig.record import own_digest
+    >>> own_digest(b"numbers") == own_digest(b"numbers"), len(own_digest(b""))
+    (True, 64)
+    """
+    return hmac.new(_secret(), content, sha256).hexdigest()
+
+
+@cache
+def _secret() -> bytes:
+    """Return the secret of this user, which is made when it is first asked for."""
+    from platformdirs import user_cache_path
+
+    file = user_cache_path(_FOLDER, appauthor=False) / _FILE
+    with suppress(FileExistsError, DiskError):
+        write_private(file, secrets.token_bytes(_BYTES))
+    return _read(file) or secrets.token_bytes(_BYTES)
+
+
+def _read(file: Path) -> bytes | None:
+    """Return the secret in a file that this user alone can read; None if it is none."""
+    with suppress(OSError, LabrigError), open_regular(file) as opened:
+        status = os.fstat(opened.fileno())
+        is_own = os.name == "nt" or (
+            status.st_uid == os.getuid() and not stat.S_IMODE(status.st_mode) & 0o077
+        )
+        content = opened.read(_BYTES + 1)
+        if is_own and len(content) == _BYTES:
+            return content
+    return None
+
 
 #: Folder of the frames in a run folder.
 FRAMES = "frames"

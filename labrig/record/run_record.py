@@ -9,12 +9,6 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from labrig.foundation.errors import DataError
-from labrig.record.document_checks import (
-    check_descriptor,
-    check_event,
-    check_start,
-    check_stop,
-)
 from labrig.record.frames import (
     UNDONE,
     ActionRecord,
@@ -24,7 +18,16 @@ from labrig.record.frames import (
     TemperatureRecord,
     unit_within,
 )
-from labrig.record.journal import JOURNAL, Document, JournalContent, read_journal
+from labrig.record.journal import (
+    JOURNAL,
+    Document,
+    JournalContent,
+    check_descriptor,
+    check_event,
+    check_start,
+    check_stop,
+    read_journal,
+)
 from labrig.record.plain_folder import require_plain_folder
 
 #: End of the year 9999 in seconds since 1970, the limit of `datetime`.
@@ -137,7 +140,7 @@ class RunRecord:
         attempts = [_attempt_within(name, attempt) for attempt in self.completed().values()]
         return replace(self, attempts=[attempt for attempt in attempts if attempt is not None])
 
-    def beside(self, name: str) -> "RunRecord":
+    def without_part(self, name: str) -> "RunRecord":
         """Return the completed units of all other parts of a chain, by their whole names."""
         attempts = [
             attempt

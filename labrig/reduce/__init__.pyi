@@ -61,7 +61,10 @@ from .photon_transfer import (
     variance_terms as variance_terms,
 )
 from .pictures import (
+    MakeThumbnail as MakeThumbnail,
     Picture as Picture,
+    SaturatedFraction as SaturatedFraction,
+    Thumbnail as Thumbnail,
     binned as binned,
     is_grey as is_grey,
     jpeg as jpeg,
@@ -93,19 +96,12 @@ from .series import (
     reduce_series as reduce_series,
 )
 from .strip import (
+    FLICKER as FLICKER,
     FoundStrip as FoundStrip,
     find_strip as find_strip,
-    strip_profile as strip_profile,
-)
-from .strip_frames import (
-    FLICKER as FLICKER,
     find_strip_in as find_strip_in,
     region_values as region_values,
     slice_values as slice_values,
+    strip_profile as strip_profile,
     strip_profile_in as strip_profile_in,
-)
-from .thumbnails import (
-    MakeThumbnail as MakeThumbnail,
-    SaturatedFraction as SaturatedFraction,
-    Thumbnail as Thumbnail,
 )

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from labrig.foundation.errors import DataError
-from labrig.reduce.codec import encoded
+from labrig.reduce.kept_reductions import encoded
 from labrig.reduce.raw import RawFrame, read_raw
 
 Reduced_co = TypeVar("Reduced_co", covariant=True)
@@ -15,7 +15,7 @@ class Reduction(Protocol[Reduced_co]):
     """A reduction of frames: a frozen dataclass that can be imported by its name.
 
     Its fields are all that the outcome depends on besides the frames. They and the outcome, whose
-    type is annotated, are values as `labrig.reduce.codec` describes them.
+    type is annotated, are values as `labrig.reduce.kept_reductions` describes them.
     """
 
     def __call__(self, frames: Iterator[RawFrame], /) -> Reduced_co:

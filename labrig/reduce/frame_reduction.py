@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar, get_type_hints
 
 from labrig.record import FRAMES
-from labrig.reduce.codec import decoded
 from labrig.reduce.decoding import Reduction, reduced_text
 from labrig.reduce.frame_workers import texts_from_workers, worker_count
-from labrig.reduce.kept_reductions import KeptReductions
+from labrig.reduce.kept_reductions import KeptReductions, decoded
 
 Reduced = TypeVar("Reduced")
 

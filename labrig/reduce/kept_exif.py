@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from labrig.foundation.errors import UsageError
 from labrig.foundation.input_file import open_regular
 from labrig.record import FRAMES
-from labrig.reduce.codec import decoded, encoded
 from labrig.reduce.frame_reduction import StoredFrame
-from labrig.reduce.kept_reductions import KeptReductions
+from labrig.reduce.kept_reductions import KeptReductions, decoded, encoded
 from labrig.reduce.raw import Exif, read_exif
 
 

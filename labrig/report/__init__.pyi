@@ -1,6 +1,3 @@
-from .calibrations_used import (
-    calibration_sections as calibration_sections,
-)
 from .charge import (
     charge_report as charge_report,
 )
@@ -8,9 +5,6 @@ from .colours import (
     camera_to_xyz as camera_to_xyz,
     css_colour as css_colour,
     into_gamut as into_gamut,
-)
-from .contact_sheet import (
-    draw_contact_sheet as draw_contact_sheet,
 )
 from .curve_sketch import (
     describe_curves as describe_curves,
@@ -25,7 +19,15 @@ from .design import (
     describe_energy as describe_energy,
     describe_factor as describe_factor,
     describe_nearest as describe_nearest,
+    describe_scene_design as describe_scene_design,
+    describe_spread as describe_spread,
     draw_design as draw_design,
+    draw_scene_design as draw_scene_design,
+)
+from .figure_files import (
+    require_picture as require_picture,
+    save_picture as save_picture,
+    write_figures_pdf as write_figures_pdf,
 )
 from .figure_style import (
     DASHED as DASHED,
@@ -40,12 +42,6 @@ from .figure_style import (
     line_entry as line_entry,
     new_figure as new_figure,
     place as place,
-)
-from .figures_pdf import (
-    write_figures_pdf as write_figures_pdf,
-)
-from .frame_sheet import (
-    draw_frames as draw_frames,
 )
 from .led_study import (
     ComparedLeds as ComparedLeds,
@@ -62,22 +58,14 @@ from .mixture import (
     describe_mixture as describe_mixture,
     difference_lines as difference_lines,
 )
-from .mixture_page import (
-    mixture_report as mixture_report,
-)
+from .mixture_page import mixture_report as mixture_report
 from .page import (
     Report as Report,
     section_page as section_page,
     with_later as with_later,
     write_report as write_report,
 )
-from .phosphor_picture import (
-    draw_phosphor as draw_phosphor,
-)
-from .picture_file import (
-    require_picture as require_picture,
-    save_picture as save_picture,
-)
+from .phosphor_picture import draw_phosphor as draw_phosphor
 from .renderers import (
     render as render,
 )
@@ -87,13 +75,9 @@ from .reradiation import (
     reradiation_text as reradiation_text,
 )
 from .run_sections import (
+    calibration_sections as calibration_sections,
     lamp_sections as lamp_sections,
     temperature_sections as temperature_sections,
-)
-from .scene_design import (
-    describe_scene_design as describe_scene_design,
-    describe_spread as describe_spread,
-    draw_scene_design as draw_scene_design,
 )
 from .sections import (
     Picture as Picture,
@@ -104,6 +88,10 @@ from .sections import (
 )
 from .shared_decay import (
     shared_decay_report as shared_decay_report,
+)
+from .sheets import (
+    draw_contact_sheet as draw_contact_sheet,
+    draw_frames as draw_frames,
 )
 from .sweep import (
     SweptPoint as SweptPoint,

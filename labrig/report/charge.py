@@ -22,8 +22,8 @@ from labrig.report.chart import (
     logarithmic_axis,
 )
 from labrig.report.figure_style import INK, MUTED, OTHER_CHANNELS, SHADE
-from labrig.report.interval_table import interval_tables
 from labrig.report.page import Report
+from labrig.report.parameters import interval_tables
 from labrig.report.sections import Picture, Section, Table
 
 #: Largest number of points of each part; more readings are averaged.

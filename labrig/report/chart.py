@@ -20,8 +20,10 @@ from labrig.report.figure_style import (
     WIDTH_PT,
     LineStyle,
     Marker,
+    Ticks,
+    decade_ticks,
+    linear_ticks,
 )
-from labrig.report.ticks import Ticks, decade_ticks, linear_ticks
 
 NO_VALUES = np.empty(0)
 

@@ -15,7 +15,7 @@ from labrig.optics import (
     read_camera,
     shipped_cameras,
 )
-from labrig.report.picture_file import require_picture, save_picture
+from labrig.report.figure_files import require_picture, save_picture
 
 #: Bars of 0 to 8 eighths of the height of a line of text.
 BARS = " ▁▂▃▄▅▆▇█"

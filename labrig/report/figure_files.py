@@ -1,4 +1,4 @@
-"""Figures of a report as SVG: on the page, and as files beside it.
+"""Files of figures: SVG on a page and beside it, one PDF of all, pictures that a command draws.
 
 On the page, colours are CSS variables with the colour of the light scheme as fallback, so that one
 figure serves the light scheme, the dark scheme and print. Text remains text: on the page it takes
@@ -7,6 +7,7 @@ the page's font and can be searched, in the files it can be edited.
 
 import html
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -14,11 +15,12 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from labrig.foundation.output_file import make_folder_in, write_text
+from labrig.foundation.errors import UsageError
+from labrig.foundation.output_file import make_folder, make_folder_in, write_durably, write_text
 from labrig.report.chart import Chart
 from labrig.report.chart_svg import svg_body
 from labrig.report.figure_style import VARIABLES, figure_style
-from labrig.report.sections import Picture
+from labrig.report.sections import Picture, Section
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -159,3 +161,115 @@ def _with_own_ids(body: str, name: str) -> str:
     """
     body = re.sub(r'\bid="', f'id="{name}-', body)
     return body.replace("url(#", f"url(#{name}-").replace('xlink:href="#', f'href="#{name}-')
+
+
+def write_figures_pdf(path: Path, title: str, sections: Sequence[Section]) -> int:
+    """Draw the figures of all sections as pages of one PDF.
+
+    Text remains text, in an embedded font. The same sections give the same bytes.
+
+    Parameters
+    ----------
+    path
+        Path of the PDF.
+    title
+        Title of the PDF.
+    sections
+        Sections of a report.
+
+    Returns
+    -------
+    int
+        Number of pages; without figures no file is written.
+
+    Raises
+    ------
+    DiskError
+        If `path` cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from labrig.report import Picture, Section, new_figure, place, write_figures_pdf
+    >>> def line():
+    ...     figure = new_figure(200)
+    ...     place(figure, left=62, bottom=38, right=12, top=30).plot([0, 1], [1, 0])
+    ...     return figure
+    >>> section = Section("Decay", figures=(Picture("line", line),))
+    >>> write_figures_pdf(Path("figures.pdf"), "A line", [section])
+    1
+    """
+    from matplotlib.backends.backend_pdf import PdfPages  # slow to load
+
+    pictures = [picture for section in sections for picture in section.figures]
+    if not pictures:
+        return 0
+    # Without dates and versions the same figures give the same bytes.
+    metadata = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
+    content = BytesIO()
+    with figure_style(), PdfPages(content, metadata=metadata) as pdf:
+        for picture in pictures:
+            figure = picture.figure()
+            figure.patch.set(visible=True, facecolor="white")
+            pdf.savefig(figure)
+    make_folder(path.parent)
+    write_durably(path, content.getvalue())
+    return len(pictures)
+
+
+PICTURES = (".png", ".svg", ".pdf")
+DPI = 150
+
+
+def require_picture(path: Path) -> None:
+    """Refuse, before anything is drawn, a file name that is not that of a picture.
+
+    Parameters
+    ----------
+    path
+        Path of the picture.
+
+    Raises
+    ------
+    UsageError
+        It does not end in `.png`, `.svg` or `.pdf`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.report import require_picture
+    >>> require_picture(Path("glow.png"))
+    """
+    if path.suffix.lower() not in PICTURES:
+        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+
+
+def save_picture(figure: "Figure", path: Path, dpi: float = DPI) -> None:
+    """Write a figure into a file, in the format of its ending.
+
+    Parameters
+    ----------
+    figure
+        Figure of matplotlib.
+    path
+        Path of the file, which ends in `.png`, `.svg` or `.pdf`.
+    dpi
+        Pixels of each inch.
+
+    Raises
+    ------
+    DiskError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.report import new_figure, save_picture
+    >>> save_picture(new_figure(200), Path("empty.png"))
+    >>> Path("empty.png").is_file()
+    True
+    """
+    content = BytesIO()
+    figure.savefig(content, format=path.suffix[1:].lower(), dpi=dpi)
+    write_durably(path, content.getvalue())

@@ -30,22 +30,20 @@ from labrig.report.figure_style import (
     PAPER,
     RULE,
 )
-from labrig.report.heat_map import (
+from labrig.report.mixture import FittedMatrix
+from labrig.report.reradiation_figures import (
     BAND_NM,
     HEAT_HEIGHT_PT,
     INCIDENT,
-    heat_figure,
-    largest,
-    shown_values,
-)
-from labrig.report.mixture import FittedMatrix
-from labrig.report.reradiation_spectra import (
     LEGEND_MARGINS,
     SPECTRA_HEIGHT_PT,
     MatrixSpectrum,
     emission_spectra,
     excitation_spectra,
+    heat_figure,
+    largest,
     limits,
+    shown_values,
     spectra_chart,
 )
 from labrig.report.sections import Picture

@@ -1,12 +1,14 @@
-"""Results of a fitted decay as rows of tables and sentences."""
+"""Results of a fitted decay as rows of tables and sentences, and tables of intervals."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from markupsafe import Markup
 
 from labrig.foundation.number_format import plus_minus, rounded
-from labrig.results import EXPONENTIALS, LAW_LABELS, FittedDecay
+from labrig.report.sections import Table
+from labrig.results import EXPONENTIALS, LAW_LABELS, FittedDecay, ProfileInterval, interval_rows
 
 #: Relative σ of a rate from which its reciprocal is given without σ.
 WORST_FOR_LIFETIME = 0.5
@@ -215,3 +217,18 @@ def _bic_difference(bic: float, best: float) -> str:
 def _p_value(p: float) -> str:
     """Return a p-value as text."""
     return "< 10⁻⁶" if p < 1e-6 else rounded(p, 2)
+
+
+CAPTION = (
+    "Limits by profile likelihood, all other parameters fitted anew at each value: where ± 1 σ is "
+    "off by more than 20 %, or as asked for. < and >: one-sided, the data exclude nothing on the "
+    "other side."
+)
+
+
+def interval_tables(intervals: Mapping[str, ProfileInterval]) -> tuple[Table, ...]:
+    """Return the table of intervals by the name of their parameter; none without intervals."""
+    if not intervals:
+        return ()
+    head, *rows = interval_rows(intervals)
+    return (Table(("", "value", *head[2:]), tuple(tuple(row) for row in rows), CAPTION),)

@@ -8,9 +8,9 @@ import numpy as np
 from labrig.foundation.errors import UsageError
 from labrig.foundation.number_format import rounded
 from labrig.material import Material, State
+from labrig.report.figure_files import require_picture, save_picture
 from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
 from labrig.report.material_tables import UNITS
-from labrig.report.picture_file import require_picture, save_picture
 
 #: Name of the panel of the albedo among those of the states' quantities.
 ALBEDO = "albedo"

@@ -1,12 +1,45 @@
-"""Rendering of a result by the renderer that its protocol registers."""
+"""Rendering of a result: by its protocol's renderer, as plain tables, or part by part."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
+
+import numpy as np
 
 from labrig.foundation.plugins import measurement
-from labrig.report import any_result
-from labrig.report.budgets import budget_lines, budget_sections
-from labrig.report.sections import Rendered, Renderer, Source
-from labrig.results import RunResult
+from labrig.report.run_sections import budget_lines, budget_sections
+from labrig.report.sections import Rendered, Renderer, Section, Source, Table
+from labrig.results import RunResult, iter_values
+
+#: Largest number of values that are shown; of longer arrays only the shape is shown.
+MAX_SHOWN = 12
+
+
+def plain_tables(result: RunResult, source: Source) -> Rendered:
+    """Return a table of all fields of the result; names of nested fields are joined by dots."""
+    rows = tuple(
+        (".".join(path).replace("_", " "), _value_text(value))
+        for path, value in iter_values(result)
+        if path != ("warnings",)
+    )
+    table = Table(("Quantity", "Value"), rows, "Value with its standard uncertainty (1 σ).")
+    lines = tuple(f"{name}: {value}" for name, value in rows)
+    return Rendered((Section("Results", tables=(table,)),), lines)
+
+
+def _value_text(value: Any) -> str:
+    """Return a value of a result as text."""
+    if isinstance(value, np.ndarray):
+        if value.size > MAX_SHOWN:
+            return f"{' × '.join(map(str, value.shape))} numbers"
+        return ", ".join(f"{number:.6g}" for number in value.ravel())
+    if isinstance(value, tuple | list):
+        if len(value) > MAX_SHOWN:
+            return f"{len(value)} values"
+        return ", ".join(map(_value_text, value)) or "none"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "none" if value is None else str(value)
 
 
 def render(result: RunResult, source: Source) -> Rendered:
@@ -51,10 +84,43 @@ def render(result: RunResult, source: Source) -> Rendered:
      'How far each number may be trusted']
     """
     registered = measurement(result.kind, str(source.run.folder))
-    show: Renderer = registered.load("report") or any_result.render
+    show: Renderer = registered.load("report") or plain_tables
     rendered = show(result, source)
     return replace(
         rendered,
         sections=(*rendered.sections, *budget_sections(result)),
         lines=(*rendered.lines, *budget_lines(result)),
     )
+
+
+def render_chain(
+    results: Mapping[str, RunResult],
+    source: Source,
+    first: Section,
+    last: Sequence[Section] = (),
+) -> Rendered:
+    """Render every part of a chain that has a result, between sections about the whole."""
+    rendered = {name: render(results[name], part) for name, part in _parts(results, source)}
+    sections = [first]
+    for name, rendered_part in rendered.items():
+        sections += [replace(section, part=name) for section in rendered_part.sections]
+    return Rendered(
+        (*sections, *last),
+        tuple(
+            f"{name}: {line}"
+            for name, rendered_part in rendered.items()
+            for line in rendered_part.lines
+        ),
+        tuple(section for rendered_part in rendered.values() for section in rendered_part.methods),
+    )
+
+
+def _parts(results: Mapping[str, RunResult], source: Source) -> Iterator[tuple[str, Source]]:
+    """Yield name and source of every part of the chain that has a result."""
+    for link in source.protocol.chain():
+        if link.name in results:
+            run = source.run.part(link.name)
+            yield (
+                link.name,
+                replace(source, run=run, protocol=link.protocol, anchor=f"{link.name}-"),
+            )

@@ -12,16 +12,17 @@ from labrig.foundation.number_format import plus_minus, rounded
 from labrig.material import Appearance, ReradiationMatrix, appearance, reradiates
 from labrig.optics import XYZ_TO_SRGB, Spectrum, edges_from_centres, is_narrow
 from labrig.report.colours import css_colour, into_gamut
+from labrig.report.figure_files import require_picture, save_picture
 from labrig.report.figure_style import INK, MUTED, RULE, figure_style
-from labrig.report.heat_map import (
+from labrig.report.reradiation_figures import (
     BAND_NM,
     draw_heat,
+    emission_spectra,
     label_heat,
     largest,
     shown_values,
+    spectra_marks,
 )
-from labrig.report.picture_file import require_picture, save_picture
-from labrig.report.reradiation_spectra import emission_spectra, spectra_marks
 
 # matplotlib is slow to load.
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Sections of a report that do not depend on the protocol: lamp, shield, door, temperature."""
+"""Sections that do not depend on the protocol: bench, temperature, calibrations, budgets of σ."""
 
 from collections.abc import Collection
 from itertools import groupby
@@ -7,7 +7,9 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.quantity import duration_text
+from labrig.foundation.yaml_file import read_yaml
 from labrig.record import (
+    CALIBRATIONS_FILE,
     SMOOTHED_S,
     RunRecord,
     TemperatureHistory,
@@ -18,8 +20,9 @@ from labrig.record import (
 )
 from labrig.report.chart import Band, Chart, Line, Margins, Panel, Points, linear_axis
 from labrig.report.figure_style import INK, MUTED, SHADE
-from labrig.report.sections import Picture, Section
+from labrig.report.sections import Picture, Section, Table
 from labrig.report.timing import moves_text
+from labrig.results import UNDIVIDED, Budget, RunResult
 
 HEIGHT_PT = 180.0
 #: Longest run in s whose time axis is in minutes; that of longer runs is in hours.
@@ -164,3 +167,101 @@ def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Sectio
             "0.65 eV deep."
         )
     return (Section("Temperature", (text,), (picture,)),)
+
+
+TEXT = (
+    "The rig file names none of these: they were found beside the runs or the rig file, the newest "
+    "ones of this bench."
+)
+
+
+def calibration_sections(run: RunRecord) -> tuple[Section, ...]:
+    """Return the section on calibrations that were found beside the runs.
+
+    Parameters
+    ----------
+    run
+        A recorded run.
+
+    Returns
+    -------
+    tuple of Section
+        A table of their files and ages; empty if there were none.
+
+    Raises
+    ------
+    UsageError
+        The run's record of them is malformed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import calibration_sections
+    >>> calibration_sections(labrig.read_run("runs/decay"))
+    ()
+    """
+    path = run.folder / CALIBRATIONS_FILE
+    if not path.is_file():
+        return ()
+    found = read_yaml(path)
+    rows = tuple(
+        (kind.replace("_", " "), *(str(entry.get(key, "")) for key in ("made", "age", "file")))
+        for kind, entry in found.items()
+        if isinstance(entry, dict)
+    )
+    table = Table(("Calibration", "Made", "Age when the run began", "File"), rows)
+    return (Section("Calibrations", (TEXT,), tables=(table,)),)
+
+
+TITLE = "How far each number may be trusted"
+#: Text of a component that is not included.
+MISSING = "–"
+#: Most budgets that are printed in the terminal.
+MAX_LINES = 4
+CAPTION = (
+    "σ is the root of the sum of squares of its components; a dash is not included in it. A range "
+    "by the model is beside σ and not in it."
+)
+
+
+def budget_sections(result: RunResult) -> tuple[Section, ...]:
+    """Return the section with the budgets of a result; none where it has none."""
+    budgets = result.budgets()
+    if not budgets:
+        return ()
+    causes = [
+        cause
+        for cause in ("noise", "calibration", UNDIVIDED, "model")
+        if any(cause in budget.components for budget in budgets.values())
+    ]
+    has_range = any(budget.model_range is not None for budget in budgets.values())
+    head = (
+        "Quantity",
+        *(["Range by model"] if has_range else []),
+        "Value ± σ",
+        *(f"{cause[0].upper()}{cause[1:]}" for cause in causes),
+        "Not included",
+    )
+    rows = tuple(
+        (name, *([budget.model_text or MISSING] if has_range else []), *_cells(budget, causes))
+        for name, budget in budgets.items()
+    )
+    return (Section(TITLE, tables=(Table(head, rows, CAPTION),)),)
+
+
+def budget_lines(result: RunResult) -> tuple[str, ...]:
+    """Return the budgets of a result as lines for the terminal, one per headline value.
+
+    Of more than `MAX_LINES` values there is one line, which says that the report has them.
+    """
+    budgets = result.budgets()
+    if len(budgets) > MAX_LINES:
+        return (f"budgets of {len(budgets)} values are in the report",)
+    return tuple(f"budget of {name}: {budget}" for name, budget in budgets.items())
+
+
+def _cells(budget: Budget, causes: list[str]) -> tuple[str, ...]:
+    """Return value, components and what is not included, a cell each."""
+    parts = budget.components
+    sizes = (budget.size_text(parts[cause]) if cause in parts else MISSING for cause in causes)
+    return (budget.value_text, *sizes, ", ".join(budget.not_included) or "nothing named")

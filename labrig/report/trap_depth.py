@@ -18,10 +18,9 @@ from labrig.report.chart import (
     Points,
     logarithmic_axis,
 )
-from labrig.report.figure_style import INK, MARKERS, OTHER_CHANNELS
+from labrig.report.figure_style import INK, MARKERS, OTHER_CHANNELS, linear_ticks
 from labrig.report.page import Report
 from labrig.report.sections import Picture, Section, Table
-from labrig.report.ticks import linear_ticks
 from labrig.results import StateDepth
 
 HEIGHT_PT = 300.0

@@ -1,7 +1,3 @@
-from .export.exported_scene import (
-    ExportedMesh as ExportedMesh,
-    Glow as Glow,
-)
 from .export.gltf import (
     write_gltf as write_gltf,
 )
@@ -13,6 +9,8 @@ from .export.rgb_preview import (
     rgb_preview as rgb_preview,
 )
 from .export.scene_export import (
+    ExportedMesh as ExportedMesh,
+    Glow as Glow,
     exported_meshes as exported_meshes,
 )
 from .mesh_file.read_mesh import (
@@ -30,11 +28,6 @@ from .picture.exr import (
     write_linear_exr as write_linear_exr,
     write_spectral_exr as write_spectral_exr,
 )
-from .picture.night import (
-    NightLook as NightLook,
-    night_view as night_view,
-    scotopic_luminance as scotopic_luminance,
-)
 from .picture.png import (
     read_png_texts as read_png_texts,
     write_png as write_png,
@@ -48,6 +41,9 @@ from .picture.rendering import (
     Seen as Seen,
 )
 from .picture.shown import (
+    NightLook as NightLook,
+    night_view as night_view,
+    scotopic_luminance as scotopic_luminance,
     shown_frames as shown_frames,
     white_under as white_under,
 )
@@ -59,6 +55,7 @@ from .picture.view import (
     require_traceable as require_traceable,
 )
 from .scene.built_scene import (
+    Assumptions as Assumptions,
     Scene as Scene,
     build_scene as build_scene,
     load_scene as load_scene,
@@ -77,16 +74,11 @@ from .scene.scene_file import (
     SceneFile as SceneFile,
     read_scene as read_scene,
 )
-from .scene.scene_materials import (
-    Assumptions as Assumptions,
-)
 from .surface.bands import (
     Bands as Bands,
 )
 from .surface.field import (
     Field as Field,
-)
-from .surface.field_parameters import (
     FieldParameters as FieldParameters,
 )
 from .surface.parameter_texture import (

@@ -9,11 +9,6 @@ from .budget import (
     UNDIVIDED as UNDIVIDED,
     Budget as Budget,
 )
-from .chain_result import ChainResult as ChainResult
-from .charge_closure import (
-    Closure as Closure,
-    spans_decades as spans_decades,
-)
 from .charging_series import (
     Charge as Charge,
     ChargingSeries as ChargingSeries,
@@ -25,8 +20,9 @@ from .decay_patch import (
     NoiseBudget as NoiseBudget,
     ResultWithDecays as ResultWithDecays,
 )
-from .decay_reference import (
+from .decay_timing import (
     DecayReference as DecayReference,
+    UnseenFlicker as UnseenFlicker,
     first_row_at as first_row_at,
 )
 from .direct_columns import (
@@ -57,13 +53,19 @@ from .fitted_decay_file import (
     write_fitted_decay as write_fitted_decay,
 )
 from .fitted_excitation import (
+    PRIOR_DENSITY as PRIOR_DENSITY,
+    THICKNESS as THICKNESS,
     UPPER_SIGMAS as UPPER_SIGMAS,
     BandQuantity as BandQuantity,
     BandTests as BandTests,
+    Closure as Closure,
     ConcentrationAtOff as ConcentrationAtOff,
+    DensityBasis as DensityBasis,
     ExcitationModel as ExcitationModel,
     ExcitedState as ExcitedState,
     FittedExcitation as FittedExcitation,
+    LayerEffect as LayerEffect,
+    spans_decades as spans_decades,
 )
 from .fitted_law import (
     AUTO as AUTO,
@@ -82,9 +84,15 @@ from .fitted_law import (
 )
 from .fluorescent_patch import (
     ColourUnderLight as ColourUnderLight,
+    EstimateMethod as EstimateMethod,
     FluorescentPatch as FluorescentPatch,
     MatrixOnBands as MatrixOnBands,
     MeasuredDye as MeasuredDye,
+    MeasuringMethod as MeasuringMethod,
+    MethodDifference as MethodDifference,
+    MixtureOfMatrix as MixtureOfMatrix,
+    ReradiatedSpectrum as ReradiatedSpectrum,
+    ReradiationUnderLight as ReradiationUnderLight,
 )
 from .interval import (
     ASYMMETRIC as ASYMMETRIC,
@@ -93,12 +101,6 @@ from .interval import (
     interval_lines as interval_lines,
     interval_rows as interval_rows,
     read_intervals as read_intervals,
-)
-from .layer_effect import (
-    PRIOR_DENSITY as PRIOR_DENSITY,
-    THICKNESS as THICKNESS,
-    DensityBasis as DensityBasis,
-    LayerEffect as LayerEffect,
 )
 from .luminance import (
     MARKING_S as MARKING_S,
@@ -121,19 +123,9 @@ from .measured import (
     measured_number as measured_number,
     with_uncertainty as with_uncertainty,
 )
-from .picture_change import (
-    PictureChange as PictureChange,
-)
-from .reradiation_methods import (
-    EstimateMethod as EstimateMethod,
-    MeasuringMethod as MeasuringMethod,
-    MethodDifference as MethodDifference,
-    MixtureOfMatrix as MixtureOfMatrix,
-    ReradiatedSpectrum as ReradiatedSpectrum,
-    ReradiationUnderLight as ReradiationUnderLight,
-)
 from .run_result import (
     AnyResult as AnyResult,
+    ChainResult as ChainResult,
     RunResult as RunResult,
     read_result as read_result,
     write_result as write_result,
@@ -156,6 +148,7 @@ from .shared_decay import (
 )
 from .strip_profile import (
     LocatedLines as LocatedLines,
+    PictureChange as PictureChange,
     SliceValues as SliceValues,
     StripProfile as StripProfile,
 )
@@ -167,11 +160,11 @@ from .summary import (
 from .table_clock import (
     TableClock as TableClock,
 )
-from .table_layout import (
-    TableLayout as TableLayout,
-)
 from .text_files import (
     write_csv as write_csv,
+)
+from .time_axis import (
+    TableLayout as TableLayout,
 )
 from .trap_depth import (
     StateDepth as StateDepth,
@@ -185,7 +178,4 @@ from .under_lamps import (
     PredictedUnderLamps as PredictedUnderLamps,
     SeenColour as SeenColour,
     ValidatedSample as ValidatedSample,
-)
-from .unseen_flicker import (
-    UnseenFlicker as UnseenFlicker,
 )

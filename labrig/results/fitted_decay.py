@@ -13,7 +13,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.number_format import aligned, rounded
 from labrig.material import exponential_means_and_slopes
-from labrig.results.decay_reference import DecayReference
+from labrig.results.decay_timing import DecayReference, UnseenFlicker
 from labrig.results.fitted_law import (
     EXPONENTIALS,
     LAW_LABELS,
@@ -26,7 +26,6 @@ from labrig.results.fitted_law import (
 from labrig.results.interval import ProfileInterval, interval_lines
 from labrig.results.measured import Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text
-from labrig.results.unseen_flicker import UnseenFlicker
 
 #: Times of the measurement beyond which a signal is not predicted with σ.
 FORECAST_SPANS = 3.0

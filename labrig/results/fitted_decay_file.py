@@ -11,7 +11,7 @@ import numpy as np
 
 from labrig.foundation.errors import DataError, LabrigError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
-from labrig.results.decay_reference import DecayReference
+from labrig.results.decay_timing import DecayReference, UnseenFlicker
 from labrig.results.fitted_decay import (
     SCHEMA_VERSION,
     Candidate,
@@ -23,7 +23,6 @@ from labrig.results.fitted_decay import (
 from labrig.results.fitted_law import fitted_law, fitted_rate_spectrum
 from labrig.results.interval import read_intervals
 from labrig.results.text_files import write_json
-from labrig.results.unseen_flicker import UnseenFlicker
 
 FILE = "fit.json"
 

@@ -1,16 +1,73 @@
-"""Fit of an excitation: rates of all states and bands with their uncertainties."""
+"""Fit of an excitation: rates of states and bands, closure, and the range that thickness leaves."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 
 from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
 from labrig.foundation.detection import RATE_LIMIT_SIGMA
+from labrig.foundation.number_format import rounded
 from labrig.material import MAX_ORDER
 from labrig.results.interval import ProfileInterval
-from labrig.results.layer_effect import LayerEffect
 from labrig.results.measured import Measured, OneSided
+
+#: Name of the cause in budgets.
+THICKNESS = "thickness"
+#: Largest optical density where nothing was measured: the back gets 1 % of the light.
+PRIOR_DENSITY = 2.0
+
+
+class DensityBasis(StrEnum):
+    """Origin of the largest optical density that a sample may have."""
+
+    PRIOR = "not measured"
+    STATED = "as stated"
+    REFLECTANCE = "by its reflectance, if it does not scatter"
+
+
+@dataclass(frozen=True, eq=False)
+class LayerEffect:
+    """Range of k_e and Λ of a layer over those of a surface with the same glow.
+
+    It is a range of what may be, and no standard uncertainty.
+
+    Attributes
+    ----------
+    optical_density
+        Least and largest decadic optical density that the charges leave, in the band of which it is
+        largest.
+    basis
+        Origin of the largest one that was tried.
+    k_e_factor
+        Least and largest k_e over the fitted, of light as it falls on the surface, shape (2, N, B).
+    reradiation_factor
+        Least and largest Λ over the fitted, shape (2, N).
+    """
+
+    optical_density: tuple[float, float]
+    basis: DensityBasis
+    k_e_factor: FloatArray
+    reradiation_factor: FloatArray
+
+    @property
+    def is_shown(self) -> bool:
+        """True if the charges themselves contradict a surface."""
+        return self.optical_density[0] > 0
+
+    def __str__(self) -> str:
+        """Return the statement in words."""
+        low, high = (rounded(end, 2) for end in self.optical_density)
+        shown = "by the charges themselves" if self.is_shown else self.basis
+        k_e, whole = (_times(factor) for factor in (self.k_e_factor, self.reradiation_factor))
+        return f"optical density {low} to {high} ({shown}): true k_e {k_e}, Λ {whole} those stated"
+
+
+def _times(factor: FloatArray) -> str:
+    low, high = (rounded(end, 3) for end in (float(factor.min()), float(factor.max())))
+    return f"{low} to {high} times"
+
 
 #: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
@@ -350,3 +407,71 @@ class FittedExcitation:
     def k_e(self) -> FloatArray:
         """Return the excitation rates of all states in 1/s, shape (N, B)."""
         return np.array([state.k_e_per_s for state in self.states])
+
+
+#: Ratio of the longest to the shortest charge from which an axis is logarithmic.
+MANY_TIMES = 20.0
+
+
+def spans_decades(charge_s: FloatArray) -> bool:
+    """Return whether charge durations differ so much that a logarithmic axis suits them.
+
+    Parameters
+    ----------
+    charge_s
+        Duration of each charge in seconds, shape (n,).
+
+    Returns
+    -------
+    bool
+        True if the shortest is above 0 s and the longest is more than 20 times as long.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.results import spans_decades
+    >>> spans_decades(np.array([1.0, 10.0, 100.0])), spans_decades(np.array([10.0, 20.0]))
+    (True, False)
+    """
+    low = float(charge_s.min())
+    return low > 0 and float(charge_s.max()) > MANY_TIMES * low
+
+
+@dataclass(frozen=True, eq=False)
+class Closure:
+    """Measured against predicted levels after n charges; nothing is fitted to them.
+
+    Attributes
+    ----------
+    charge_s
+        Duration of each charge in seconds, corrected for the lamp's transients, shape (n,).
+    measured, predicted
+        Levels in DN/s, shape (n,).
+    sigma
+        Standard uncertainty of their difference in DN/s, shape (n,).
+    curve_charge_s, curve
+        Durations in seconds from the shortest to the longest charge, and predicted levels in DN/s
+        after them, shape (m,).
+    """
+
+    charge_s: FloatArray
+    measured: FloatArray
+    sigma: FloatArray
+    predicted: FloatArray
+    curve_charge_s: FloatArray
+    curve: FloatArray
+
+    @property
+    def rms_percent(self) -> float:
+        """RMS deviation in % of the RMS of the predicted levels."""
+        full = max(_rms(self.predicted), np.finfo(float).tiny)
+        return 100 * _rms(self.measured - self.predicted) / full
+
+    @property
+    def rms_sigma(self) -> float:
+        """RMS deviation in σ: about 1 if noise and the uncertainty of the prediction explain it."""
+        return _rms((self.measured - self.predicted) / self.sigma)
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

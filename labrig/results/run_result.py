@@ -1,4 +1,4 @@
-"""Result of a run's analysis: a frozen type for each protocol, and its file `result.json`."""
+"""Result of a run's analysis or a chain's: a frozen type per protocol, and its `result.json`."""
 
 import json
 import math
@@ -11,7 +11,7 @@ from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, V
 
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
-from labrig.foundation.output_file import write_text
+from labrig.foundation.output_file import make_folder_in, write_text
 from labrig.foundation.plugins import measurement
 from labrig.results.text_files import finite
 
@@ -219,3 +219,34 @@ def _first_error(error: Exception) -> str:
 def _nonfinite_text(number: float) -> str:
     """Return the text for a number that is not finite, in pydantic's spelling."""
     return "NaN" if math.isnan(number) else "Infinity" if number > 0 else "-Infinity"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ChainResult(RunResult):
+    """Results of the parts of a chain.
+
+    Attributes
+    ----------
+    parts
+        Result of each part by its name, in the order of the run; those that could not be analysed
+        are missing.
+    failed
+        Reason why a part could not be analysed, by its name.
+    """
+
+    parts: Mapping[str, AnyResult]
+    failed: Mapping[str, str]
+
+    def provides(self) -> dict[str, Any]:
+        """Return the values that all parts provide; the later part has priority."""
+        provided: dict[str, Any] = {}
+        for part in self.parts.values():
+            for name, value in part.provides().items():
+                by_patch = isinstance(value, Mapping)
+                provided[name] = {**provided.get(name, {}), **value} if by_patch else value
+        return provided
+
+    def write_files(self, folder: Path) -> None:
+        """Write the files of every part into a folder of its name."""
+        for name, part in self.parts.items():
+            part.write_files(make_folder_in(folder, name))

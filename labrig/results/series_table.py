@@ -20,9 +20,8 @@ from labrig.results.table_columns import (
     Columns,
     find_columns,
 )
-from labrig.results.table_layout import TableLayout
 from labrig.results.table_rows import independent_rows, measured_rows, with_limits
-from labrig.results.time_axis import TimeAxis
+from labrig.results.time_axis import TableLayout, TimeAxis
 from labrig.text_table import (
     DECIMAL_MARKS,
     EXPECTED,

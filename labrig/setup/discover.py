@@ -9,8 +9,7 @@ import usb.core
 import usb.util
 
 from labrig.acquire import SERVICES
-from labrig.setup.host import Host, Port
-from labrig.setup.port_users import port_users, unreachable
+from labrig.setup.host import Host, Port, port_users, unreachable
 
 NO_LIBUSB = (
     "libusb is not installed, so USB cameras cannot be seen: install libusb-1.0 (Linux: "
@@ -52,7 +51,7 @@ def _unlisted(name: str) -> _Board:
 
 _MAESTRO = _Board(
     "Pololu Maestro servo controller",
-    "maestro_door",
+    "maestro",
     ", channel: 0, closed: 1000 us, open: 2000 us, travel: 300 ms",
     role="door",
     hints=(
@@ -63,10 +62,10 @@ _MAESTRO = _Board(
 
 #: Boards by USB vendor and product, or vendor alone. Sources: vendors' manuals, USB ID repository.
 _BOARDS: dict[tuple[int, int | None], _Board] = {
-    (0x2A19, None): _Board("Numato relay board", "numato_relay", ", relay: 0, warm_up: 15 min"),
+    (0x2A19, None): _Board("Numato relay board", "numato", ", relay: 0, warm_up: 15 min"),
     (0x1A86, 0x7523): _Board(
         "CH340 adapter, as on LCUS relay boards and Arduino clones",
-        "lcus_relay",
+        "lcus",
         ", relay: 1, warm_up: 15 min",
         hints=("nothing tells what is behind it: use its line only if it is an LCUS board",),
     ),
@@ -180,8 +179,8 @@ def discover(host: Host, drivers: Collection[str]) -> Discovery:
     ...     device="/dev/ttyACM0", description="", vid=0x2A19, pid=0x0C01, serial_number=None
     ... )
     >>> pc = Host("linux", ports=lambda: [port], usb_devices=list, processes=list)
-    >>> discover(pc, ["numato_relay"]).ports[0].snippet
-    'lamp: {driver: numato_relay, address: "/dev/ttyACM0", relay: 0, warm_up: 15 min}'
+    >>> discover(pc, ["numato"]).ports[0].snippet
+    'lamp: {driver: numato, address: "/dev/ttyACM0", relay: 0, warm_up: 15 min}'
     """
     ports = tuple(
         _serial(port, drivers) for port in sorted(host.ports(), key=lambda port: port.device)

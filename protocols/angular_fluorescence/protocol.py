@@ -27,9 +27,9 @@ from labrig.foundation.errors import ProtocolError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import Count, DurationS
 from labrig.foundation.region import Region
+from labrig.protocols.steps.bracketing import Bracketing
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.led_scenes import LedNames
-from labrig.protocols.steps.scenes import Bracketing
 
 
 class AngularFrames(StrEnum):
@@ -182,7 +182,7 @@ class AngularFluorescence(ProtocolModel):
             raise ValueError(f"expected 'reflected_led' not among 'leds', got {self.reflected_led}")
         return self
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Refuse a rig whose LEDs shine on a sphere from another angle than is told here."""
         angles = rig.optics.angles_deg
         if self.shape == "sphere" and angles is not None and sum(angles) != self.light.angle:
@@ -329,7 +329,7 @@ class LightBackUnit:
 
 
 def _exposure_s(session: Session, bracketing: Bracketing, led: str) -> float:
-    return session.choose(
+    return session.decide(
         "exposure",
         lambda: bracketing.metered_s(session, _metering(led), led),
         bracketing.longest_s,

@@ -12,7 +12,7 @@ from labrig.analyse.frames import (
     require_calibrated_camera,
     timing_warnings,
 )
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND, BlankFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -114,7 +114,7 @@ def _weighted_mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, F
     return mean, np.sqrt(np.maximum(misfit, 1.0) / weights.sum(axis=0))
 
 
-def analyse(part: Part) -> BlankResult:
+def analyse(context: AnalysisContext) -> BlankResult:
     """Measure the light after lamp off where nothing glows.
 
     Raises
@@ -122,10 +122,10 @@ def analyse(part: Part) -> BlankResult:
     DataError
         No sequence is complete, or a frame is missing or was changed.
     """
-    protocol, run, camera = part.protocol, part.run, part.inputs[CAMERA_KIND]
-    region = part_region(part, protocol.region)
-    frames = intact_frames(run, part.overrides, BLANK_FRAMES)
-    require_calibrated_camera(camera, run, part_frames(part, BLANK_FRAMES))
+    protocol, run, camera = context.protocol, context.run, context.inputs[CAMERA_KIND]
+    region = part_region(context, protocol.region)
+    frames = intact_frames(run, context.overrides, BLANK_FRAMES)
+    require_calibrated_camera(camera, run, part_frames(context, BLANK_FRAMES))
     series = reduce_patches(frames.decay, {"blank": region}, frames.dark, camera=camera)["blank"]
     # Hot pixels are of one colour: left in, they look like light.
     hot = hot_pixels_of(frames.dark)

@@ -23,6 +23,11 @@ from labrig.foundation.errors import ProtocolError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.foundation.region import CENTRE, Region
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
 from labrig.protocols.steps.camera_settings import (
     DARKS_PER_EXPOSURE,
     CameraSettings,
@@ -31,7 +36,6 @@ from labrig.protocols.steps.camera_settings import (
 )
 from labrig.protocols.steps.sample_pose import charge, face_camera, lights_out, visible_after_s
 from labrig.protocols.steps.sanity_checks import SanityChecks
-from labrig.protocols.steps.scenes import Arrangement, Scene, ScenesProtocol
 from labrig.record import FrameRole
 
 #: Reason for the blank.
@@ -58,7 +62,7 @@ class Clean(FrozenModel):
     fraction: Fraction = Field(1e-5, ge=0, lt=1)
 
 
-class Blank(ScenesProtocol):
+class Blank(ConfiguredProtocol):
     """Settings of a blank; `blank.yaml` is the commented example.
 
     Attributes
@@ -109,13 +113,13 @@ class Blank(ScenesProtocol):
             )
         return self
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return dark frames, then the sequences."""
-        blank = Arrangement("blank")
+        blank = BenchConfiguration("blank")
         sequences = (SequenceUnit(self, number) for number in range(1, len(self.later_by) + 1))
         return [
-            Scene(BlankDarkUnit(self), blank, WHY, is_dark=True),
-            *(Scene(sequence, blank, WHY) for sequence in sequences),
+            ConfiguredUnit(BlankDarkUnit(self), blank, WHY, is_dark=True),
+            *(ConfiguredUnit(sequence, blank, WHY) for sequence in sequences),
         ]
 
     def settings(self, exposure_s: float) -> ExposureSettings:

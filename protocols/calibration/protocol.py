@@ -5,8 +5,13 @@ from dataclasses import replace
 from typing import Literal
 
 from labrig.acquire import Unit
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredUnit,
+    Stage,
+    in_turn,
+)
 from labrig.protocols.steps.chain import Chain
-from labrig.protocols.steps.scenes import Arrangement, Scene, Stage, in_turn
 
 _CARD: Stage = "grey card"
 
@@ -14,7 +19,7 @@ _CARD: Stage = "grey card"
 class Calibration(Chain):
     """Settings of a bench's calibration; `calibration.yaml` is the commented example.
 
-    All dark frames come first; then all that needs one arrangement of the bench is photographed
+    All dark frames come first; then all that needs one configuration of the bench is photographed
     before the next one is asked for, with the lamp burning, and the mercury lamp comes last.
     """
 
@@ -28,32 +33,32 @@ class Calibration(Chain):
         return None
 
     def units(self) -> Sequence[Unit]:
-        """Return the units of all parts, those with the same arrangement together."""
-        scenes = [scene for part in self.chain() for scene in part.scenes()]
+        """Return the units of all parts, those with the same configuration together."""
+        scenes = [scene for part in self.chain() for scene in part.configured_units()]
         lit = sorted((scene for scene in scenes if not scene.is_dark), key=_turn)
         first = lit[0] if lit else scenes[0]
         dark = (
-            replace(scene, arrangement=first.arrangement, why=first.why)
+            replace(scene, configuration=first.configuration, why=first.why)
             for scene in scenes
             if scene.is_dark
         )
         return in_turn([*dark, *lit])
 
 
-def _turn(scene: Scene) -> tuple[bool, int, bool]:
-    """Return the place of a scene in the order of the bench's arrangements."""
-    wanted = scene.arrangement
+def _turn(scene: ConfiguredUnit) -> tuple[bool, int, bool]:
+    """Return the place of a scene in the order of the bench's configurations."""
+    wanted = scene.configuration
     is_mercury = wanted.lamp == "mercury"
     halogen = (
-        Arrangement("blank"),
-        Arrangement(_CARD),
-        Arrangement(_CARD, "on sample"),
-        Arrangement(_CARD, "before camera"),
+        BenchConfiguration("blank"),
+        BenchConfiguration(_CARD),
+        BenchConfiguration(_CARD, "on sample"),
+        BenchConfiguration(_CARD, "before camera"),
     )
     mercury = (
-        Arrangement(_CARD, "before camera"),
-        Arrangement(_CARD, "on sample"),
-        Arrangement("sample", "on sample"),
+        BenchConfiguration(_CARD, "before camera"),
+        BenchConfiguration(_CARD, "on sample"),
+        BenchConfiguration("sample", "on sample"),
     )
     usual = replace(wanted, lamp="halogen", filter=None)
     order = mercury if is_mercury else halogen

@@ -1,7 +1,7 @@
 """Report of a bench's calibration: the bench, then every part."""
 
 from labrig.protocols.calibration.result import CalibrationResult
-from labrig.report.chain import render_chain
+from labrig.report.renderers import render_chain
 from labrig.report.sections import Rendered, Section, Source, Table
 
 TEXT = (

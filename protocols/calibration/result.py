@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import REFERENCE_KIND, ReferenceFile
-from labrig.results.chain_result import ChainResult
+from labrig.results.run_result import ChainResult
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

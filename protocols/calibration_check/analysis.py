@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from labrig.acquire import CalibrationRules
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import REFERENCE_KIND
 from labrig.foundation.errors import DataError
 from labrig.protocols.calibration_check.protocol import (
@@ -15,7 +15,7 @@ from labrig.protocols.calibration_check.protocol import (
 from labrig.protocols.calibration_check.result import CalibrationCheckResult
 
 
-def analyse(part: Part) -> CalibrationCheckResult:
+def analyse(context: AnalysisContext) -> CalibrationCheckResult:
     """Compare the card through the filter with the picture of the calibration.
 
     Raises
@@ -25,14 +25,16 @@ def analyse(part: Part) -> CalibrationCheckResult:
     UsageError
         The calibration is no longer there.
     """
-    protocol = part.protocol
+    protocol = context.protocol
     frames = [
-        frame for frame in part.run.frames(CheckFrames.CARD) if not part.overrides.excludes(frame)
+        frame
+        for frame in context.run.frames(CheckFrames.CARD)
+        if not context.overrides.excludes(frame)
     ]
     if not frames:
         raise DataError(
-            f"{part.run.folder}: no picture of the card through the filter is complete; go on "
-            f"with: labrig resume {part.run.folder}"
+            f"{context.run.folder}: no picture of the card through the filter is complete; go on "
+            f"with: labrig resume {context.run.folder}"
         )
     reference = REFERENCE_KIND.read(Path(protocol.reference))
     change = picture_change(frames, picture_of(reference, protocol.reference))

@@ -14,8 +14,13 @@ from labrig.fit.lvf import compare_card_pictures, place_means
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.named_files import FilePath
 from labrig.foundation.quantity import Count, DurationS
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
+from labrig.protocols.steps.bracketing import Bracketing, SceneUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
-from labrig.protocols.steps.scenes import Arrangement, Bracketing, Scene, ScenesProtocol, SceneUnit
 from labrig.record import FrameRecord
 from labrig.reduce import find_strip, read_hdr_frame, strip_profile
 from labrig.results import Measured, PictureChange
@@ -31,7 +36,7 @@ class CheckFrames(StrEnum):
     CARD = "check-card"
 
 
-class CalibrationCheck(ScenesProtocol):
+class CalibrationCheck(ConfiguredProtocol):
     """Settings of a calibration's check; `calibration_check.yaml` is the commented example.
 
     Attributes
@@ -56,7 +61,7 @@ class CalibrationCheck(ScenesProtocol):
     longest: DurationS = Field(8.0, gt=0)
     repeats: Count = Field(2, ge=1)
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the protocol with the rig file's reference and rules.
 
         Raises
@@ -79,12 +84,12 @@ class CalibrationCheck(ScenesProtocol):
             }
         )
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return the card through the filter before the camera."""
         bracketing = Bracketing(self.camera, self.longest, self.repeats)
         unit = CheckUnit(bracketing, "card", CheckFrames.CARD, protocol=self)
         why = "whether lamp, card and filter are still as they were calibrated"
-        return [Scene(unit, Arrangement("grey card", "before camera"), why)]
+        return [ConfiguredUnit(unit, BenchConfiguration("grey card", "before camera"), why)]
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,7 @@ class CheckUnit(SceneUnit):
             A rule of the rig file is broken.
         """
         none: tuple[tuple[str, str], ...] = ()
-        told = session.choose("broken rules", lambda: self._broken(session), worst=none)
+        told = session.decide("broken rules", lambda: self._broken(session), when_planned=none)
         rules = self.protocol.rules or CalibrationRules()
         for rule, text in told:
             if rule in rules.only_warn:

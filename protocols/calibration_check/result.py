@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from labrig.results.picture_change import PictureChange
 from labrig.results.run_result import RunResult
+from labrig.results.strip_profile import PictureChange
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -23,6 +23,11 @@ from labrig.acquire import (
 )
 from labrig.foundation.quantity import Count, DurationS
 from labrig.foundation.region import CENTRE, Region
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
 from labrig.protocols.steps.camera_settings import CameraSettings, FNumber, Iso
 from labrig.protocols.steps.grey_card import (
     CARD_REASON,
@@ -33,7 +38,6 @@ from labrig.protocols.steps.grey_card import (
     card_light,
     light_card,
 )
-from labrig.protocols.steps.scenes import Arrangement, Scene, ScenesProtocol
 
 
 class CardFrames(StrEnum):
@@ -230,7 +234,7 @@ def _overlap(first: Region, second: Region) -> bool:
     )
 
 
-class CameraCalibration(ScenesProtocol):
+class CameraCalibration(ConfiguredProtocol):
     """Settings of a camera calibration; `camera_calibration.yaml` is the commented example.
 
     Attributes
@@ -301,7 +305,7 @@ class CameraCalibration(ScenesProtocol):
         """Return the reference settings, whose shutter time is to be metered."""
         return ExposureSettings(1.0, self.camera.iso, self.camera.f_number)
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, metering, photon transfer, repeats, brackets, flats."""
         reference = self.settings()
         apertures: list[float | None] = [*self.f_numbers] or [None]
@@ -322,8 +326,8 @@ class CameraCalibration(ScenesProtocol):
             ),
             *(FlatUnit(reference, self.card, f_number) for f_number in apertures),
         ]
-        card = Arrangement("grey card")
+        card = BenchConfiguration("grey card")
         return [
-            *(Scene(dark, card, CARD_REASON, is_dark=True) for dark in darks),
-            *(Scene(unit, card, CARD_REASON) for unit in lit),
+            *(ConfiguredUnit(dark, card, CARD_REASON, is_dark=True) for dark in darks),
+            *(ConfiguredUnit(unit, card, CARD_REASON) for unit in lit),
         ]

@@ -8,7 +8,7 @@ import numpy as np
 from labrig.acquire import RigFile
 from labrig.analyse.chart_scene import ChartScene, chart_scene, frames_of
 from labrig.analyse.frames import steady_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import (
     card_reflectance,
     lamp_spectrum,
@@ -54,7 +54,7 @@ SEEN_NM = (400.0, 700.0)
 UNEVEN = 0.6
 
 
-def analyse(part: Part) -> CameraCurvesResult:
+def analyse(context: AnalysisContext) -> CameraCurvesResult:
     """Estimate the camera's curves with σ.
 
     Raises
@@ -65,22 +65,22 @@ def analyse(part: Part) -> CameraCurvesResult:
     DataError
         Frames are missing or damaged, or no chart is to be seen in them.
     """
-    protocol = part.protocol
-    lamp, patches = _seen_lamp(part.rig), read_colour_chart(protocol.chart)
-    left_out = _left_out(part)
+    protocol = context.protocol
+    lamp, patches = _seen_lamp(context.rig), read_colour_chart(protocol.chart)
+    left_out = _left_out(context)
     cameras = [
         read_camera(camera.path) for camera in shipped_cameras() if camera.name not in left_out
     ]
-    scene = chart_scene(part, CurvesFrames.CHART, CurvesFrames.CARD if protocol.card else None)
+    scene = chart_scene(context, CurvesFrames.CHART, CurvesFrames.CARD if protocol.card else None)
     if scene.value.shape[1] != len(CHANNELS):
         raise DataError(
-            f"{part.run.folder}: expected frames with the channels R, G and B, got "
+            f"{context.run.folder}: expected frames with the channels R, G and B, got "
             f"{scene.value.shape[1]}; curves of a monochrome camera need a monochromator"
         )
     reflectance = np.array([patch.at(GRID_NM) for patch in patches])
     readings = ChartReadings(scene.value, scene.sigma, reflectance, scene.place, scene.unevenness)
-    through = _through(part) if protocol.through else None
-    identity = part.run.camera_identity.partition(",")[0]
+    through = _through(context) if protocol.through else None
+    identity = context.run.camera_identity.partition(",")[0]
     fit = fit_camera_curves(readings, lamp, cameras, through, name=identity or "camera")
     camera = fit.camera
     assert camera.sigma is not None, "estimated curves have σ"
@@ -122,36 +122,37 @@ def _seen_lamp(rig: RigFile) -> Spectrum:
     return lamp
 
 
-def _left_out(part: Part) -> tuple[str, ...]:
+def _left_out(context: AnalysisContext) -> tuple[str, ...]:
     """Return the names of the shipped cameras from which nothing is concluded."""
     shipped = {camera.name: camera for camera in shipped_cameras()}
-    for name in part.protocol.leave_out:
+    for name in context.protocol.leave_out:
         if name not in shipped:
             raise UsageError(
                 f"leave_out: no shipped camera is called '{name}'; "
                 f"{did_you_mean(name, list(shipped))}"
             )
-    identity = part.run.camera_identity.partition(",")[0]
+    identity = context.run.camera_identity.partition(",")[0]
     own = [name for name, camera in shipped.items() if camera.is_called(identity)]
-    return tuple(sorted({*own, *part.protocol.leave_out}))
+    return tuple(sorted({*own, *context.protocol.leave_out}))
 
 
-def _through(part: Part) -> FilterReadings:
+def _through(context: AnalysisContext) -> FilterReadings:
     """Return the readings of the card through the filter."""
-    calibrated = part.inputs[LVF_KIND]
+    calibrated = context.inputs[LVF_KIND]
     if calibrated is None or calibrated.before_camera is None:
         raise UsageError(
-            f"{part.run.folder}: no LVF is known that is before the camera; run lvf_calibration, "
+            f"{context.run.folder}: no LVF is known that is before the camera; "
+            "run lvf_calibration, "
             "and name its run in the rig file (optics: {lvf: …}) or to labrig process --optics"
         )
-    frames, strip = frames_of(part, CurvesFrames.THROUGH), calibrated.before_camera
-    darks = steady_frames(part.run, part.overrides, FrameRole.DARK)
-    (values,) = slice_values(frames, strip, darks, part.inputs[CAMERA_KIND]).values()
+    frames, strip = frames_of(context, CurvesFrames.THROUGH), calibrated.before_camera
+    darks = steady_frames(context.run, context.overrides, FrameRole.DARK)
+    (values,) = slice_values(frames, strip, darks, context.inputs[CAMERA_KIND]).values()
     layout = sensor_layout(frames[0])
     places = np.array(strip.positions(layout.width, layout.height))
     inside = np.clip(places, calibrated.position[0], calibrated.position[-1])
     return FilterReadings(
-        values.value, values.sigma, calibrated.lvf.at(inside), card_reflectance(part.rig)
+        values.value, values.sigma, calibrated.lvf.at(inside), card_reflectance(context.rig)
     )
 
 

@@ -13,6 +13,12 @@ from pydantic import Field
 from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
+from labrig.protocols.steps.bracketing import Bracketing, SceneUnit, StillDarkUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.chart_scenes import (
     CARD_UNIT,
@@ -22,14 +28,6 @@ from labrig.protocols.steps.chart_scenes import (
     WHY_CHART,
     WHY_THROUGH,
     ChartUnit,
-)
-from labrig.protocols.steps.scenes import (
-    Arrangement,
-    Bracketing,
-    Scene,
-    ScenesProtocol,
-    SceneUnit,
-    StillDarkUnit,
 )
 from labrig.protocols.steps.strip_scenes import StripUnit
 
@@ -43,11 +41,11 @@ class CurvesFrames(StrEnum):
 
 
 CameraName = Annotated[str, Field(min_length=1)]
-_CARD, _CHART = Arrangement("grey card"), Arrangement("colorchecker")
-_THROUGH = Arrangement("grey card", "before camera")
+_CARD, _CHART = BenchConfiguration("grey card"), BenchConfiguration("colorchecker")
+_THROUGH = BenchConfiguration("grey card", "before camera")
 
 
-class CameraCurves(ScenesProtocol):
+class CameraCurves(ConfiguredProtocol):
     """Settings of a measurement of camera curves; `camera_curves.yaml` is the commented example.
 
     Attributes
@@ -91,15 +89,17 @@ class CameraCurves(ScenesProtocol):
         missing = self.through and rig.optics.named(LVF_KIND) is None
         return [LVF_KIND.protocol] if missing else []
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, card and chart, and the card through the filter."""
-        scenes = [Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True)]
+        scenes = [
+            ConfiguredUnit(StillDarkUnit(self.bracketing), BenchConfiguration(), "", is_dark=True)
+        ]
         if self.card:
             card = SceneUnit(self.bracketing, CARD_UNIT, CurvesFrames.CARD)
-            scenes.append(Scene(card, _CARD, WHY_CARD))
+            scenes.append(ConfiguredUnit(card, _CARD, WHY_CARD))
         chart = ChartUnit(self.bracketing, CHART_UNIT, CurvesFrames.CHART)
-        scenes.append(Scene(chart, _CHART, WHY_CHART))
+        scenes.append(ConfiguredUnit(chart, _CHART, WHY_CHART))
         if self.through:
             through = StripUnit(self.bracketing, THROUGH_UNIT, CurvesFrames.THROUGH)
-            scenes.append(Scene(through, _THROUGH, WHY_THROUGH))
+            scenes.append(ConfiguredUnit(through, _THROUGH, WHY_THROUGH))
         return scenes

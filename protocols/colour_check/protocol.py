@@ -15,6 +15,12 @@ from labrig.acquire import RigFile
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
 from labrig.optics import CHART_PATCHES
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
+from labrig.protocols.steps.bracketing import Bracketing, SceneUnit, StillDarkUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.chart_scenes import (
     CARD_UNIT,
@@ -24,14 +30,6 @@ from labrig.protocols.steps.chart_scenes import (
     WHY_CHART,
     WHY_THROUGH,
     ChartUnit,
-)
-from labrig.protocols.steps.scenes import (
-    Arrangement,
-    Bracketing,
-    Scene,
-    ScenesProtocol,
-    SceneUnit,
-    StillDarkUnit,
 )
 from labrig.protocols.steps.strip_scenes import StripUnit
 
@@ -46,8 +44,8 @@ class CheckFrames(StrEnum):
 
 
 PatchNumber = Annotated[int, Field(ge=1, le=len(CHART_PATCHES))]
-_CARD, _CHART = Arrangement("grey card"), Arrangement("colorchecker")
-_CARD_THROUGH = Arrangement("grey card", "before camera")
+_CARD, _CHART = BenchConfiguration("grey card"), BenchConfiguration("colorchecker")
+_CARD_THROUGH = BenchConfiguration("grey card", "before camera")
 WHY_PATCH = "its spectrum is known, and the filter is to show the same"
 
 
@@ -56,7 +54,7 @@ def patch_unit(number: int) -> str:
     return f"patch-{number:02d}"
 
 
-class ColourCheck(ScenesProtocol):
+class ColourCheck(ConfiguredProtocol):
     """Settings of a check of colours; `colour_check.yaml` is the commented example.
 
     Attributes
@@ -105,19 +103,19 @@ class ColourCheck(ScenesProtocol):
         missing = bool(self.numbers) and rig.optics.named(LVF_KIND) is None
         return [LVF_KIND.protocol] if missing else []
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, card and chart plainly, card and patches through the LVF."""
         taken = self.bracketing
         scenes = [
-            Scene(StillDarkUnit(taken), Arrangement(), "", is_dark=True),
-            Scene(SceneUnit(taken, CARD_UNIT, CheckFrames.CARD), _CARD, WHY_CARD),
-            Scene(ChartUnit(taken, CHART_UNIT, CheckFrames.CHART), _CHART, WHY_CHART),
+            ConfiguredUnit(StillDarkUnit(taken), BenchConfiguration(), "", is_dark=True),
+            ConfiguredUnit(SceneUnit(taken, CARD_UNIT, CheckFrames.CARD), _CARD, WHY_CARD),
+            ConfiguredUnit(ChartUnit(taken, CHART_UNIT, CheckFrames.CHART), _CHART, WHY_CHART),
         ]
         if self.numbers:
             card = StripUnit(taken, THROUGH_UNIT, CheckFrames.CARD_THROUGH)
-            scenes.append(Scene(card, _CARD_THROUGH, WHY_THROUGH))
+            scenes.append(ConfiguredUnit(card, _CARD_THROUGH, WHY_THROUGH))
         for number in self.numbers:
             patch = SceneUnit(taken, patch_unit(number), CheckFrames.PATCH)
-            arrangement = replace(_CARD_THROUGH, stage="colorchecker", chart_patch=number)
-            scenes.append(Scene(patch, arrangement, WHY_PATCH))
+            configuration = replace(_CARD_THROUGH, stage="colorchecker", chart_patch=number)
+            scenes.append(ConfiguredUnit(patch, configuration, WHY_PATCH))
         return scenes

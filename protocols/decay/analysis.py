@@ -8,13 +8,13 @@ from importlib.metadata import version
 import numpy as np
 
 from labrig.analyse.frames import (
+    glare_warning,
     intact_frames,
     require_calibrated_camera,
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.glare import glare_warning
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.surface import with_layer, with_reflectance
 from labrig.analyse.temperature import drift_an_hour, drift_warnings
@@ -89,7 +89,7 @@ def noise_parts(series: Series, channel: int, signal: FloatArray) -> FloatArray:
     return np.asarray(fractions * np.square(series.sigma[:, channel, np.newaxis]))
 
 
-def analyse(part: Part) -> DecayResult:
+def analyse(context: AnalysisContext) -> DecayResult:
     """Reduce and fit every patch; a patch that cannot be fitted has the reason instead.
 
     Raises
@@ -98,12 +98,12 @@ def analyse(part: Part) -> DecayResult:
         No decay is complete, a frame is missing or was changed after the run, or the camera file is
         of another camera, lens or aperture.
     """
-    run, protocol, overrides = part.run, part.protocol, part.overrides
+    run, protocol, overrides = context.run, context.protocol, context.overrides
     regions = overrides.patches(protocol)
     background = protocol.background if protocol.dark == "background" else None
-    frames, stray = without_stray_light(intact_frames(run, overrides), part.inputs[BLANK_KIND])
-    require_calibrated_camera(part.inputs[CAMERA_KIND], run, run.frames(FrameRole.DECAY))
-    camera = part.inputs[CAMERA_KIND]
+    frames, stray = without_stray_light(intact_frames(run, overrides), context.inputs[BLANK_KIND])
+    require_calibrated_camera(context.inputs[CAMERA_KIND], run, run.frames(FrameRole.DECAY))
+    camera = context.inputs[CAMERA_KIND]
     # A calibrated glare is subtracted, and a background has the same as the patches.
     unknown_glare = background is None and (camera is None or camera.glare is None)
     series = reduce_patches(
@@ -119,7 +119,7 @@ def analyse(part: Part) -> DecayResult:
         if whole_frame is None
         else glare_warning(series, regions, whole_frame, sensor_layout(frames.decay[0]))
     )
-    options = part.options(DecayOptions)
+    options = context.options(DecayOptions)
     states = options.states or (None if protocol.states == "auto" else protocol.states)
     fit = partial(
         fit_series,
@@ -129,7 +129,7 @@ def analyse(part: Part) -> DecayResult:
         intervals=options.intervals,
     )
     fits = fit_patches(series, fit)
-    temperature_c = glow_temperature_c(run, part.protocol.rate_frames)
+    temperature_c = glow_temperature_c(run, context.protocol.rate_frames)
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(
         patches={
@@ -138,7 +138,7 @@ def analyse(part: Part) -> DecayResult:
                 series[name],
                 fit,
                 only or name,
-                part,
+                context,
                 temperature_c,
                 "" if only else name,
             )
@@ -155,7 +155,7 @@ def analyse(part: Part) -> DecayResult:
             *_clipping_warnings(series),
             *veiled,
             *_fit_warnings(fits),
-            *drift_warnings(run, part.protocol.rate_frames, _rates(fits)),
+            *drift_warnings(run, context.protocol.rate_frames, _rates(fits)),
         ),
     )
 
@@ -206,7 +206,7 @@ def _decay_patch(
     series: Series,
     fit: DecayFit | str,
     name: str,
-    part: Part,
+    context: AnalysisContext,
     temperature_c: float | None,
     patch: str,
 ) -> DecayPatch:
@@ -220,13 +220,14 @@ def _decay_patch(
         noise=noise_budget(series, fit),
         material=with_reflectance(
             with_layer(
-                _material(series, fit, name, part.run.name, temperature_c), part.protocol.sample
+                _material(series, fit, name, context.run.name, temperature_c),
+                context.protocol.sample,
             ),
             patch,
-            part.inputs[REFLECTANCE_KIND],
+            context.inputs[REFLECTANCE_KIND],
         ),
         drift_effect=(
-            drift_an_hour(part.run, fit.drift_effect_s) if fit.law == EXPONENTIALS else None
+            drift_an_hour(context.run, fit.drift_effect_s) if fit.law == EXPONENTIALS else None
         ),
     )
 

@@ -6,15 +6,15 @@ After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appea
 from collections.abc import Sequence
 
 from labrig.acquire import Unit
+from labrig.protocols.steps.bench_configuration import BenchConfiguration, ConfiguredUnit
 from labrig.protocols.steps.decays import WHY, DaylightUnit, DecaySettings
 from labrig.protocols.steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
-from labrig.protocols.steps.scenes import Arrangement, Scene
 
 
 class Decay(DecaySettings):
     """Decay protocol; `decay.yaml` is the commented example."""
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, metering, decays and daylight, as far as needed."""
         units: list[Unit] = []
         if isinstance(self.exposure, str):
@@ -23,7 +23,7 @@ class Decay(DecaySettings):
         units += self.decays()
         if self.daylight:
             units.append(DaylightUnit(self))
-        scenes = [Scene(unit, Arrangement(), WHY) for unit in units]
+        scenes = [ConfiguredUnit(unit, BenchConfiguration(), WHY) for unit in units]
         if self.dark != "frames":
             return scenes
-        return [Scene(DarkUnit(self), Arrangement(), WHY, is_dark=True), *scenes]
+        return [ConfiguredUnit(DarkUnit(self), BenchConfiguration(), WHY, is_dark=True), *scenes]

@@ -26,9 +26,9 @@ from labrig.acquire import (
 )
 from labrig.foundation.quantity import Count, DurationS
 from labrig.optics import read_spectrometer_reading
+from labrig.protocols.steps.bench_configuration import light
 from labrig.protocols.steps.led_scenes import LED_NAMES, LedNames, shuffled
 from labrig.protocols.steps.patch_names import SampleNames
-from labrig.protocols.steps.scenes import light
 from labrig.record import PERSON, SpectrumRecord
 
 #: Integration times, as fractions of the longest.
@@ -132,7 +132,7 @@ class DirectBispectral(ProtocolModel):
 
     def units(self) -> Sequence[Unit]:
         """Return, for white and every sample, darks, all lights, and the first light once more."""
-        return [*self._lit_units(), PutBackUnit(self)]
+        return [*self._lit_units(), RestoreBench(self)]
 
     def _lit_units(self) -> Iterator[Unit]:
         order = self.shuffled()
@@ -176,7 +176,7 @@ class LitUnit:
         """Light it, let the light settle, meter and read; then read what is left without an LED."""
         session.wait_until_warm("spectrometer")
         step = _step(self.protocol, self.stage)
-        if not session.choose("in place", lambda: _is_in_place(session, step), worst=True):
+        if not session.decide("in place", lambda: _is_in_place(session, step), when_planned=True):
             session.ask(step)
         self._light(session)
         integration_s = self._metered_s(session)
@@ -203,11 +203,11 @@ class LitUnit:
         for integration_s in looks_s:
             look = ReadSpectrum(DirectSpectra.LOOK, integration_s, METERING_REPETITIONS)
             session.perform(look)
-            if session.choose(
-                "bright enough", lambda: self._fraction(session) > ENOUGH, worst=False
+            if session.decide(
+                "bright enough", lambda: self._fraction(session) > ENOUGH, when_planned=False
             ):
                 break
-        return session.choose("integration", lambda: self._chosen_s(session, times_s), times_s[-1])
+        return session.decide("integration", lambda: self._chosen_s(session, times_s), times_s[-1])
 
     def _chosen_s(self, session: Session, times_s: Sequence[float]) -> float:
         look, fraction = self._looks(session)[-1], self._fraction(session)
@@ -230,7 +230,7 @@ class LitUnit:
 
 
 @dataclass(frozen=True)
-class PutBackUnit:
+class RestoreBench:
     """The bench put back; a unit of its own, so that nothing is measured again for it."""
 
     protocol: DirectBispectral

@@ -11,15 +11,7 @@ from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.number_format import plus_minus
 from labrig.material import ReradiationMatrix
 from labrig.protocols.direct_bispectral.result import DirectBispectralResult
-from labrig.report.chart import (
-    Band,
-    Chart,
-    Line,
-    Mark,
-    Panel,
-    Points,
-    linear_axis,
-)
+from labrig.report.chart import Band, Chart, Line, Mark, Panel, Points, linear_axis
 from labrig.report.figure_style import (
     DASHED,
     INK,
@@ -31,12 +23,15 @@ from labrig.report.figure_style import (
     SOLID,
     LineStyle,
 )
-from labrig.report.heat_map import BAND_NM, draw_heat, largest, shown_values
-from labrig.report.reradiation_spectra import (
+from labrig.report.reradiation_figures import (
+    BAND_NM,
     LEGEND_MARGINS,
     SPECTRA_HEIGHT_PT,
+    draw_heat,
     emission_spectra,
+    largest,
     limits,
+    shown_values,
     spectra_marks,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table

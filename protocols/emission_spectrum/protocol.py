@@ -16,12 +16,17 @@ from labrig.calibration import LVF_KIND
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, duration_text
 from labrig.foundation.region import Region
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+    LampKind,
+)
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from labrig.protocols.steps.grey_card import light_card
 from labrig.protocols.steps.patch_names import FilterPatches
 from labrig.protocols.steps.sample_pose import charge, check_visible, lights_out
-from labrig.protocols.steps.scenes import Arrangement, LampKind, Scene, ScenesProtocol
 
 #: Begin of the units' names, which end with the lamp.
 _AFTER = "spectrum-"
@@ -62,7 +67,7 @@ WHITES_PER_EXPOSURE = 2
 #: Fewest colour filters that tell a spectrum.
 FEWEST_FILTERS = 4
 
-#: Reasons for the arrangements.
+#: Reasons for the configurations.
 THROUGH_IT = "the glow is photographed through it"
 THROUGH_FILTERS = "the glow is photographed through one filter after another"
 OTHER_LAMP = "the glow is to have the same colour whatever lamp charged it"
@@ -93,7 +98,7 @@ class CameraFilters(FrozenModel):
         return (BEFORE, *self.filters, AFTERWARDS)
 
 
-class EmissionSpectrum(GlowSettings, ScenesProtocol):
+class EmissionSpectrum(GlowSettings, ConfiguredProtocol):
     """Settings of an emission spectrum; `emission_spectrum.yaml` is the commented example.
 
     Attributes
@@ -165,38 +170,44 @@ class EmissionSpectrum(GlowSettings, ScenesProtocol):
         needed = (LVF_KIND,) if self.select is None else ()
         return [kind.protocol for kind in needed if rig.optics.named(kind) is None]
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, metering and spectrum for each lamp, then the white card."""
         if self.select is not None:
             return self._through_filters(self.select)
-        through = Arrangement(lvf="before camera")
-        scenes = [Scene(DarkUnit(self), through, THROUGH_IT, is_dark=True)]
+        through = BenchConfiguration(lvf="before camera")
+        scenes = [ConfiguredUnit(DarkUnit(self), through, THROUGH_IT, is_dark=True)]
         for lamp in self.lamps:
-            arrangement = replace(through, lamp=lamp)
+            configuration = replace(through, lamp=lamp)
             scenes += [
-                Scene(MeterUnit(self, self.charge, f"meter-{lamp}"), arrangement, OTHER_LAMP),
-                Scene(SpectrumUnit(self, lamp), arrangement, OTHER_LAMP),
+                ConfiguredUnit(
+                    MeterUnit(self, self.charge, f"meter-{lamp}"), configuration, OTHER_LAMP
+                ),
+                ConfiguredUnit(SpectrumUnit(self, lamp), configuration, OTHER_LAMP),
             ]
         if self.white:
-            card = Arrangement("grey card", "before camera")
-            scenes.append(Scene(WhiteUnit(self), card, WHITE, leaves_lamp_on=True))
+            card = BenchConfiguration("grey card", "before camera")
+            scenes.append(ConfiguredUnit(WhiteUnit(self), card, WHITE, leaves_lamp_on=True))
         return scenes
 
-    def _through_filters(self, select: CameraFilters) -> Sequence[Scene]:
+    def _through_filters(self, select: CameraFilters) -> Sequence[ConfiguredUnit]:
         """Return the same with the glow after one charge for each filter, and the card in each.
 
         Exposures are those of the glow without a filter, the same in all scenes: frames of one
         time then are of the same part of the decay.
         """
-        scenes = [Scene(DarkUnit(self), Arrangement(), THROUGH_FILTERS, is_dark=True)]
+        scenes = [
+            ConfiguredUnit(DarkUnit(self), BenchConfiguration(), THROUGH_FILTERS, is_dark=True)
+        ]
         filters = {scene: scene if scene in select.filters else None for scene in select.scenes()}
         for lamp in self.lamps:
-            open_scene = Arrangement(lamp=lamp)
+            open_scene = BenchConfiguration(lamp=lamp)
             scenes.append(
-                Scene(MeterUnit(self, self.charge, f"meter-{lamp}"), open_scene, OTHER_LAMP)
+                ConfiguredUnit(
+                    MeterUnit(self, self.charge, f"meter-{lamp}"), open_scene, OTHER_LAMP
+                )
             )
             scenes += [
-                Scene(
+                ConfiguredUnit(
                     SpectrumUnit(self, lamp, scene),
                     replace(open_scene, camera_filter=name),
                     THROUGH_FILTERS,
@@ -205,9 +216,9 @@ class EmissionSpectrum(GlowSettings, ScenesProtocol):
             ]
         if self.white:
             scenes += [
-                Scene(
+                ConfiguredUnit(
                     WhiteUnit(self, white_unit(scene)),
-                    Arrangement("grey card", camera_filter=name),
+                    BenchConfiguration("grey card", camera_filter=name),
                     WHITE,
                     leaves_lamp_on=True,
                 )

@@ -25,11 +25,7 @@ from labrig.report.figure_style import (
     points,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
-from labrig.report.spectrum_figure import (
-    COLUMNS,
-    spectrum_axes,
-    spectrum_figure,
-)
+from labrig.report.spectrum_figure import COLUMNS, spectrum_axes, spectrum_figure
 from labrig.results import EmissionSpectrum, SpectralComparison
 
 

@@ -21,13 +21,11 @@ from labrig.acquire import (
     LAMP_ON,
     LEDS,
     CameraOffers,
-    ExposureSettings,
+    LampSwitch,
     LedSwitch,
     ManualStep,
-    ProtocolModel,
     Session,
     Shoot,
-    Switch,
     Unit,
     at,
 )
@@ -38,9 +36,12 @@ from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import Count, DurationS, Fraction, duration_text
 from labrig.foundation.region import Region
 from labrig.protocols.steps.afterglow import dark_level
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
 from labrig.protocols.steps.camera_settings import (
-    MARGIN_S,
-    CameraSettings,
     dark_exposures_s,
     longest_exposure_s,
 )
@@ -54,7 +55,7 @@ from labrig.protocols.steps.exposure_metering import (
     Schedule,
     measure_frame,
 )
-from labrig.protocols.steps.glow import dark_frames
+from labrig.protocols.steps.glow import DarkUnit, MeteredSettings, ladder
 from labrig.protocols.steps.patch_names import FilterPatches
 from labrig.protocols.steps.sample_pose import (
     charge,
@@ -64,7 +65,6 @@ from labrig.protocols.steps.sample_pose import (
     lights_out,
 )
 from labrig.protocols.steps.sanity_checks import SanityChecks
-from labrig.protocols.steps.scenes import Arrangement, Scene, ScenesProtocol
 from labrig.record import FrameRecord, FrameRole
 
 
@@ -142,7 +142,7 @@ class Rest(FrozenModel):
         return self
 
 
-class ExcitationSettings(ProtocolModel):
+class ExcitationSettings(MeteredSettings):
     """Settings of excitation rates; `excitation.yaml` is the commented example.
 
     Attributes
@@ -185,8 +185,6 @@ class ExcitationSettings(ProtocolModel):
     samples
         Number of samples at hand. With more than one, a fresh sample is put in for every charge,
         instead of a rest.
-    camera
-        Sensitivity and aperture of the camera.
     sites
         Place of the filter on the sample in the frame: `[x, y, width, height]` in pixels, or all
         four as fractions of the frame. Only exposures and charge times depend on it; the fit uses
@@ -203,7 +201,7 @@ class ExcitationSettings(ProtocolModel):
         is fitted to the data.
     """
 
-    rests_on = (IRRADIANCE_KIND,)
+    requires = (IRRADIANCE_KIND,)
 
     protocol: Literal["excitation"] = "excitation"
     first_charge: DurationS = Field(8.0, gt=0)
@@ -219,7 +217,6 @@ class ExcitationSettings(ProtocolModel):
     last_decay: DurationS = Field(180.0, gt=0)
     rest: Rest = Rest()
     samples: Count = Field(1, ge=1)
-    camera: CameraSettings = CameraSettings()
     sites: Region = Field((0.1, 0.4, 0.8, 0.2))
     patches: FilterPatches = Field(default_factory=dict)
     states: Literal["auto", 1, 2, 3] = "auto"
@@ -258,23 +255,18 @@ class ExcitationSettings(ProtocolModel):
         pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
         return [longest_exposure_s(pause_s, offers) for pause_s in (*pauses_s, pauses_s[-1])]
 
-    def settings(self, exposure_s: float) -> ExposureSettings:
-        """Return the camera settings with that shutter time."""
-        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
-
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
         return dark_exposures_s(max(self.longest_exposures_s(offers, self.last_decay)), offers)
 
-    def ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Return begin after lamp off and shutter time of each metering frame."""
         longest_s = max(self.longest_exposures_s(offers, self.duration))
-        at_s, ladder = self.first, []
-        for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
-            exposure_s = offers.exposure_at_most(longest_s * fraction)
-            ladder.append((at_s, exposure_s))
-            at_s += exposure_s + offers.overhead_s + MARGIN_S
-        return ladder
+        return ladder(self.first, longest_s, offers)
+
+    def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
+        """Return the sanity checks of a unit's frames."""
+        return SanityChecks(session, unit, self.regions(), None, metering=metering)
 
     def regions(self) -> list[Region]:
         """Return the regions of the glow: every patch, or the strip on the sample."""
@@ -290,8 +282,8 @@ class ExcitationSettings(ProtocolModel):
 
 
 #: Arrangements for the charges through the filter and by the lamp itself, and their reasons.
-LVF_ON = Arrangement(lvf="on sample")
-LVF_AWAY = Arrangement()
+LVF_ON = BenchConfiguration(lvf="on sample")
+LVF_AWAY = BenchConfiguration()
 THROUGH_IT = "every place is then charged by light of another wavelength"
 BY_ONE = "light of some wavelengths charges the sample"
 BY_ITSELF = "the lamp by itself charges the sample now"
@@ -310,12 +302,12 @@ class ExcitationUnit:
     protocol: ExcitationSettings
 
     @property
-    def light_on(self) -> Switch | LedSwitch:
+    def light_on(self) -> LampSwitch | LedSwitch:
         """Action that switches the light on which charges."""
         return LAMP_ON
 
     @property
-    def light_off(self) -> Switch | LedSwitch:
+    def light_off(self) -> LampSwitch | LedSwitch:
         """Action that switches that light off."""
         return LAMP_OFF
 
@@ -340,7 +332,7 @@ class ExcitationUnit:
         if self.protocol.samples > 1:
             session.ask(FRESH)
             return
-        rest_s = session.choose("rest", lambda: self._rest_s(session), worst=rule.at_most)
+        rest_s = session.decide("rest", lambda: self._rest_s(session), when_planned=rule.at_most)
         session.rest(rest_s)
         exposure_s = max(
             self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
@@ -379,29 +371,12 @@ class ExcitationUnit:
 
 
 @dataclass(frozen=True)
-class DarkUnit(ExcitationUnit):
-    """Dark frames at the later exposures, before anything glows."""
-
-    name: str = "dark"
-
-    def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph in the dark."""
-        session.wait_until_warm("camera")
-        offers, regions = session.rig[CAMERA].offers(), self.protocol.regions()
-        exposures_s = self.protocol.dark_exposures_s(offers)
-        exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
-        dark_frames(session, self.name, regions, exposures)
-        shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
-        SanityChecks(session, self.name, regions, None).require_darkness(shorter)
-
-
-@dataclass(frozen=True)
 class _MeterUnit(ExcitationUnit):
     """A charge whose glow determines the exposures."""
 
     def _meter(self, session: Session, charge_s: float) -> None:
         session.wait_until_warm("camera")
-        ladder = self.protocol.ladder(session.rig[CAMERA].offers())
+        ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
         check_visible(session, ladder[0][0])
         charge(session, charge_s, self.light_on)
         session.run_sequence(
@@ -415,9 +390,8 @@ class _MeterUnit(ExcitationUnit):
         )
 
     def _require_glow(self, session: Session, unit: str) -> None:
-        ladder = self.protocol.ladder(session.rig[CAMERA].offers())
-        shorter = [self.protocol.settings(exposure_s) for _, exposure_s in ladder[:3]]
-        SanityChecks(session, unit, self.protocol.regions(), None).require_glow(shorter)
+        checks = self.protocol.checks(session, unit)
+        checks.require_glow(self.protocol.short_settings(session))
 
 
 @dataclass(frozen=True)
@@ -453,12 +427,12 @@ class BandMeter(_MeterUnit):
         return UnitKind.of_light(self.light, "meter")
 
     @property
-    def light_on(self) -> Switch | LedSwitch:
+    def light_on(self) -> LampSwitch | LedSwitch:
         """Action that switches the light on."""
         return _selected(self.protocol).on(self.light)
 
     @property
-    def light_off(self) -> Switch | LedSwitch:
+    def light_off(self) -> LampSwitch | LedSwitch:
         """Action that switches it off."""
         return _selected(self.protocol).off
 
@@ -528,7 +502,7 @@ class _ChargeUnit(ExcitationUnit):
             ]
             return Schedule(schedule.times_s, tuple(exposures_s))
 
-        return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
+        return session.decide("exposure", decide, Schedule.constant(times_s, longest_s))
 
     def _reference_charge(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
         """Return charge time and frames of the longest charge of the kind."""
@@ -604,7 +578,7 @@ class DoublingUnit(_ChargeUnit):
                 self._glow_by_charge(session, charges)[1], self.protocol.growth
             )
 
-        if self.number > 2 and not session.choose("the glow still grows", grows, worst=True):
+        if self.number > 2 and not session.decide("the glow still grows", grows, when_planned=True):
             return
         session.wait_until_warm("camera")
         charge_s = self.protocol.doubled_s(self.number)
@@ -634,7 +608,7 @@ class RefiningUnit(_ChargeUnit):
             )
 
         worst_s = self.protocol.doubled_s(self.protocol.at_most)
-        charge_s = session.choose("charge for so many seconds", decide, worst_s)
+        charge_s = session.decide("charge for so many seconds", decide, worst_s)
         self._charge(session, ExcitationFrames.STRIP, charge_s, self.protocol.duration)
 
 
@@ -651,12 +625,12 @@ class BandUnit(_ChargeUnit):
         return UnitKind.of_light(self.light, self.number)
 
     @property
-    def light_on(self) -> Switch | LedSwitch:
+    def light_on(self) -> LampSwitch | LedSwitch:
         """Action that switches the light on."""
         return _selected(self.protocol).on(self.light)
 
     @property
-    def light_off(self) -> Switch | LedSwitch:
+    def light_off(self) -> LampSwitch | LedSwitch:
         """Action that switches it off."""
         return _selected(self.protocol).off
 
@@ -696,7 +670,7 @@ class DirectUnit(_ChargeUnit):
         self._charge(session, ExcitationFrames.DIRECT, protocol.direct[self.number - 1], lasting_s)
 
 
-class Excitation(ExcitationSettings, ScenesProtocol):
+class Excitation(ExcitationSettings, ConfiguredProtocol):
     """Excitation protocol; `excitation.yaml` is the commented example."""
 
     @property
@@ -704,17 +678,17 @@ class Excitation(ExcitationSettings, ScenesProtocol):
         """Roles of the frames to which rates are fitted."""
         return tuple(ExcitationFrames)
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, then metering and charges by bands, then the same by the lamp itself."""
         direct: list[Unit] = [
             DirectMeter(self),
             *(DirectUnit(self, number) for number in range(1, len(self.direct) + 1)),
         ]
         rests = self.samples == 1
-        by_itself = [Scene(unit, LVF_AWAY, BY_ITSELF, rests=rests) for unit in direct]
+        by_itself = [ConfiguredUnit(unit, LVF_AWAY, BY_ITSELF, rests=rests) for unit in direct]
         if self.select is not None:
             return [
-                Scene(DarkUnit(self), LVF_AWAY, BY_ITSELF, is_dark=True),
+                ConfiguredUnit(DarkUnit(self), LVF_AWAY, BY_ITSELF, is_dark=True),
                 *self._by_lights(self.select),
                 *by_itself,
             ]
@@ -724,17 +698,19 @@ class Excitation(ExcitationSettings, ScenesProtocol):
             *(RefiningUnit(self, number) for number in range(1, self.refine + 1)),
         ]
         return [
-            Scene(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
-            *(Scene(unit, LVF_ON, THROUGH_IT, rests=rests) for unit in through),
+            ConfiguredUnit(DarkUnit(self), LVF_ON, THROUGH_IT, is_dark=True),
+            *(ConfiguredUnit(unit, LVF_ON, THROUGH_IT, rests=rests) for unit in through),
             *by_itself,
         ]
 
-    def _by_lights(self, lights: ExcitingLights) -> Iterator[Scene]:
+    def _by_lights(self, lights: ExcitingLights) -> Iterator[ConfiguredUnit]:
         """Yield metering and charges by one light after another."""
         rests = self.samples == 1
         for place, light in enumerate(lights.names()):
-            arrangement = lights.arrangement(light)
-            yield Scene(BandMeter(self, light, place == 0), arrangement, BY_ONE, rests=rests)
+            configuration = lights.configuration(light)
+            yield ConfiguredUnit(
+                BandMeter(self, light, place == 0), configuration, BY_ONE, rests=rests
+            )
             for number in range(1, len(self.charges) + 1):
                 unit = BandUnit(self, light, number)
-                yield Scene(unit, arrangement, BY_ONE, rests=rests)
+                yield ConfiguredUnit(unit, configuration, BY_ONE, rests=rests)

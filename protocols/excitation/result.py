@@ -12,11 +12,15 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.output_file import make_folder_in
 from labrig.material import Material, write_material
 from labrig.results.budget import Budget, named
-from labrig.results.charge_closure import Closure
 from labrig.results.charging_series import ChargingSeries
 from labrig.results.fitted_decay import FittedDecay
-from labrig.results.fitted_excitation import BandTests, FittedExcitation
-from labrig.results.layer_effect import THICKNESS, LayerEffect
+from labrig.results.fitted_excitation import (
+    THICKNESS,
+    BandTests,
+    Closure,
+    FittedExcitation,
+    LayerEffect,
+)
 from labrig.results.measured import Measured, measured_number
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series

@@ -26,6 +26,11 @@ from labrig.acquire import (
 )
 from labrig.foundation.quantity import Count, DurationS, duration_text
 from labrig.foundation.region import CENTRE, Region
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
 from labrig.protocols.steps.camera_settings import CameraSettings, frame_times_s
 from labrig.protocols.steps.grey_card import (
     CARD_REASON,
@@ -36,7 +41,6 @@ from labrig.protocols.steps.grey_card import (
     card_light,
     light_card,
 )
-from labrig.protocols.steps.scenes import Arrangement, Scene, ScenesProtocol
 
 
 class LampFrames(StrEnum):
@@ -64,7 +68,7 @@ WARMING_S = (4.0, 15.0, 30.0, 60.0, 100.0, 160.0, 250.0, 400.0, 600.0)
 WARMING_SHOTS, WARMING_EVERY_S = 4, 2.0
 
 
-class Fade(ScenesProtocol):
+class Fade(ConfiguredProtocol):
     """Settings of a fade; `fade.yaml` is the commented example.
 
     Attributes
@@ -142,10 +146,10 @@ class Fade(ScenesProtocol):
         filled_s = -SLOWEST_S * math.log1p(-steady_s / remaining_s)
         return offers.exposure_at_most(min(filled_s, self.longest))
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, metering, the warm-up, and passes over all delays, in the warm lamp."""
         reference = self.settings()
-        card = Arrangement("grey card", "before camera" if self.through_lvf else "away")
+        card = BenchConfiguration("grey card", "before camera" if self.through_lvf else "away")
         dark = CardDarkUnit(reference, self.card, self.camera.iso, self.longest)
         lit: list[Unit] = [
             CardMeterUnit(reference, self.card),
@@ -154,8 +158,8 @@ class Fade(ScenesProtocol):
         ]
         why = BANDS_REASON if self.through_lvf else CARD_REASON
         return [
-            Scene(dark, card, why, is_dark=True),
-            *(Scene(unit, card, why) for unit in lit),
+            ConfiguredUnit(dark, card, why, is_dark=True),
+            *(ConfiguredUnit(unit, card, why) for unit in lit),
         ]
 
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.analyse.exciting_lights import ExcitingLight, exciting_lights
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CAMERA_KIND, LVF_KIND, CardLight, IrradianceFile
@@ -55,7 +55,7 @@ LUX_SIGMA = 0.05
 _STEP = 0.5
 
 
-def analyse(part: Part) -> IrradianceResult:
+def analyse(context: AnalysisContext) -> IrradianceResult:
     """Measure the irradiance in bands, by the lamp itself and behind every place of the filter.
 
     Raises
@@ -65,23 +65,23 @@ def analyse(part: Part) -> IrradianceResult:
     DataError
         Frames are missing or damaged, or some position was not lit.
     """
-    if part.protocol.select is not None:
-        return _of_lights(part, part.protocol.select)
-    calibrated = part.inputs[LVF_KIND]
+    if context.protocol.select is not None:
+        return _of_lights(context, context.protocol.select)
+    calibrated = context.inputs[LVF_KIND]
     if calibrated is None or calibrated.on_sample is None:
         raise UsageError(
-            f"{part.run.folder}: no LVF is known that lies on the sample; run lvf_calibration, "
+            f"{context.run.folder}: no LVF is known that lies on the sample; run lvf_calibration, "
             "and name its run in the rig file (optics: {lvf: …}) or to labrig process --optics"
         )
-    frames, lamp, strip = StripFrames(part), lamp_spectrum(part.rig), calibrated.on_sample
-    values = _card_values(part, frames, strip)
-    ratio = _card_ratio(part, values)
+    frames, lamp, strip = StripFrames(context), lamp_spectrum(context.rig), calibrated.on_sample
+    values = _card_values(context, frames, strip)
+    ratio = _card_ratio(context, values)
     position = np.array(strip.positions(*frames.size))
     lvf = calibrated.lvf.at(np.clip(position, calibrated.position[0], calibrated.position[-1]))
-    camera = camera_curves(part.rig, part.overrides.camera, calibrated)
-    scale = strip_scale(ratio, lvf, lamp, card_reflectance(part.rig), camera)
+    camera = camera_curves(context.rig, context.overrides.camera, calibrated)
+    scale = strip_scale(ratio, lvf, lamp, card_reflectance(context.rig), camera)
     return IrradianceResult(
-        calibration=_file(part, strip, lvf, lamp, ratio, scale).model_copy(
+        calibration=_file(context, strip, lvf, lamp, ratio, scale).model_copy(
             update={"card": _card_light(frames, values)}
         ),
         centre_nm=lvf.bands.centre_nm,
@@ -91,7 +91,7 @@ def analyse(part: Part) -> IrradianceResult:
     )
 
 
-def _of_lights(part: Part, select: ExcitingLights) -> IrradianceResult:
+def _of_lights(context: AnalysisContext, select: ExcitingLights) -> IrradianceResult:
     """Measure the irradiance in bands, by the lamp itself and by every selected light.
 
     Raises
@@ -101,23 +101,23 @@ def _of_lights(part: Part, select: ExcitingLights) -> IrradianceResult:
     DataError
         Frames are missing or damaged, or some light was not seen.
     """
-    frames, lamp = StripFrames(part), lamp_spectrum(part.rig)
+    frames, lamp = StripFrames(context), lamp_spectrum(context.rig)
     lit = [*frames.of(CardFrames.DIRECT), *frames.of(CardFrames.THROUGH)]
-    regions = {"card": part.protocol.sites}
-    values = region_values(lit, regions, frames.dark, part.inputs[CAMERA_KIND])
+    regions = {"card": context.protocol.sites}
+    values = region_values(lit, regions, frames.dark, context.inputs[CAMERA_KIND])
     names = select.names()
     ratio = mean_ratio(
         [
             (values[f"direct-{number}"], _stacked([values[unit] for unit in units]))
-            for number in range(1, part.protocol.rounds + 1)
+            for number in range(1, context.protocol.rounds + 1)
             if {f"direct-{number}", *(units := [light_unit(name, number) for name in names])}
             <= set(values)
         ]
     )
-    lights = exciting_lights(part, select, lamp)
-    camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
-    scale = light_scale(ratio, lights, names, lamp, card_reflectance(part.rig), camera)
-    calibration = _file_of_lights(part, names, lights, lamp, ratio, scale)
+    lights = exciting_lights(context, select, lamp)
+    camera = camera_curves(context.rig, context.overrides.camera, context.inputs[LVF_KIND])
+    scale = light_scale(ratio, lights, names, lamp, card_reflectance(context.rig), camera)
+    calibration = _file_of_lights(context, names, lights, lamp, ratio, scale)
     return IrradianceResult(
         calibration=calibration.model_copy(update={"card": _card_light(frames, values)}),
         centre_nm=np.array(calibration.centre_nm),
@@ -150,16 +150,16 @@ def _stacked(values: Sequence[SliceValues]) -> SliceValues:
 
 
 def _file_of_lights(
-    part: Part,
+    context: AnalysisContext,
     names: tuple[str, ...],
     lights: Sequence[ExcitingLight],
     lamp: Spectrum,
     card: CardRatio,
     scale: StripScale,
 ) -> IrradianceFile:
-    edges, cells_nm = np.array(part.protocol.bands_nm), _cells_nm(part.protocol.bands_nm)
+    edges, cells_nm = np.array(context.protocol.bands_nm), _cells_nm(context.protocol.bands_nm)
     direct = band_integrals(lamp.wavelength_nm, lamp.value, edges)
-    norm = part.protocol.vector_length / float(np.linalg.norm(direct))
+    norm = context.protocol.vector_length / float(np.linalg.norm(direct))
     factor = scale.value[:, np.newaxis] * norm
     through, moved, through_cells = (
         factor
@@ -177,8 +177,8 @@ def _file_of_lights(
     centre_nm, width_nm = np.array([_moments(one.spectrum, edges) for one in lights]).T
     return IrradianceFile(
         lamp=lamp.name,
-        bands_nm=part.protocol.bands_nm,
-        vector_length=part.protocol.vector_length,
+        bands_nm=context.protocol.bands_nm,
+        vector_length=context.protocol.vector_length,
         direct=tuple((norm * direct).tolist()),
         direct_sigma=tuple(_direct_sigma(lamp, edges, norm).tolist()),
         lights=names,
@@ -195,10 +195,10 @@ def _file_of_lights(
         scale_sigma=card.common_sigma,
         ratio=tuple(ratio.tolist()),
         ratio_sigma=tuple((ratio * np.hypot(scale.relative_sigma, card.common_sigma)).tolist()),
-        illuminance_lux=part.protocol.illuminance_lux,
-        illuminance_sigma_lux=_lux_sigma(part.protocol),
+        illuminance_lux=context.protocol.illuminance_lux,
+        illuminance_sigma_lux=_lux_sigma(context.protocol),
         source=f"grey card by itself and by selected lights in {card.rounds} rounds, with labrig",
-        run=part.run.name,
+        run=context.run.name,
     )
 
 
@@ -219,10 +219,12 @@ def _moments(light: Spectrum, edges_nm: FloatArray) -> tuple[float, float]:
     return mean, float(np.sqrt(np.average((grid_nm - mean) ** 2, weights=weight)))
 
 
-def _card_values(part: Part, frames: StripFrames, strip: Strip) -> Mapping[str, SliceValues]:
+def _card_values(
+    context: AnalysisContext, frames: StripFrames, strip: Strip
+) -> Mapping[str, SliceValues]:
     """Return the light of the card along the strip's place, scene by scene."""
     lit = [*frames.of(CardFrames.DIRECT), *frames.of(CardFrames.THROUGH)]
-    return slice_values(lit, strip, frames.dark, part.inputs[CAMERA_KIND])
+    return slice_values(lit, strip, frames.dark, context.inputs[CAMERA_KIND])
 
 
 def _card_light(frames: StripFrames, values: Mapping[str, SliceValues]) -> CardLight | None:
@@ -243,11 +245,11 @@ def _card_light(frames: StripFrames, values: Mapping[str, SliceValues]) -> CardL
     )
 
 
-def _card_ratio(part: Part, values: Mapping[str, SliceValues]) -> CardRatio:
+def _card_ratio(context: AnalysisContext, values: Mapping[str, SliceValues]) -> CardRatio:
     return mean_ratio(
         [
             (values[f"direct-{number}"], values[f"through-{number}"])
-            for number in range(1, part.protocol.rounds + 1)
+            for number in range(1, context.protocol.rounds + 1)
             if f"direct-{number}" in values and f"through-{number}" in values
         ]
     )
@@ -277,11 +279,16 @@ def mean_ratio(pairs: Sequence[tuple[SliceValues, SliceValues]]) -> CardRatio:
 
 
 def _file(
-    part: Part, strip: Strip, lvf: Lvf, lamp: Spectrum, card: CardRatio, scale: StripScale
+    context: AnalysisContext,
+    strip: Strip,
+    lvf: Lvf,
+    lamp: Spectrum,
+    card: CardRatio,
+    scale: StripScale,
 ) -> IrradianceFile:
-    edges = np.array(part.protocol.bands_nm)
+    edges = np.array(context.protocol.bands_nm)
     direct = band_integrals(lamp.wavelength_nm, lamp.value, edges)
-    norm = part.protocol.vector_length / float(np.linalg.norm(direct))
+    norm = context.protocol.vector_length / float(np.linalg.norm(direct))
     shape, shape_sigma = in_bands(lvf, lamp, edges)
     factor = scale.value[:, np.newaxis] * norm
     relative = scale.relative_sigma
@@ -290,8 +297,8 @@ def _file(
     ratio = norm * direct.sum() / through.sum(axis=1)
     return IrradianceFile(
         lamp=lamp.name,
-        bands_nm=part.protocol.bands_nm,
-        vector_length=part.protocol.vector_length,
+        bands_nm=context.protocol.bands_nm,
+        vector_length=context.protocol.vector_length,
         direct=tuple((norm * direct).tolist()),
         direct_sigma=tuple(_direct_sigma(lamp, edges, norm).tolist()),
         position=tuple(lvf.position.tolist()),
@@ -301,10 +308,10 @@ def _file(
         ratio=tuple(ratio.tolist()),
         ratio_sigma=tuple((ratio * np.hypot(relative, card.common_sigma)).tolist()),
         strip=strip,
-        illuminance_lux=part.protocol.illuminance_lux,
-        illuminance_sigma_lux=_lux_sigma(part.protocol),
+        illuminance_lux=context.protocol.illuminance_lux,
+        illuminance_sigma_lux=_lux_sigma(context.protocol),
         source=f"grey card by itself and through the LVF in {card.rounds} rounds, with labrig",
-        run=part.run.name,
+        run=context.run.name,
     )
 
 

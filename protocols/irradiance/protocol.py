@@ -26,6 +26,12 @@ from labrig.acquire import (
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
 from labrig.foundation.region import Region
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+)
+from labrig.protocols.steps.bracketing import Bracketing, SceneUnit, StillDarkUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.exciting_lights import (
     CardSpectra,
@@ -35,14 +41,6 @@ from labrig.protocols.steps.exciting_lights import (
 )
 from labrig.protocols.steps.led_spectra import SpectrumReadings
 from labrig.protocols.steps.sample_pose import LAMP_DARK_S, face_lamp
-from labrig.protocols.steps.scenes import (
-    Arrangement,
-    Bracketing,
-    Scene,
-    ScenesProtocol,
-    SceneUnit,
-    StillDarkUnit,
-)
 from labrig.protocols.steps.strip_scenes import StripUnit
 
 
@@ -55,8 +53,8 @@ class CardFrames(StrEnum):
 
 #: Edges of the bands of Table 1 of the paper.
 BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
-_DIRECT = Arrangement("grey card")
-_THROUGH = Arrangement("grey card", "on sample")
+_DIRECT = BenchConfiguration("grey card")
+_THROUGH = BenchConfiguration("grey card", "on sample")
 
 
 @dataclass(frozen=True)
@@ -129,12 +127,12 @@ class DarkSpectraUnit:
             return tuple(sorted({record.integration_s for record in records}))
 
         longest_s = (self.readings.longest_s,) * self.most
-        for integration_s in session.choose("integration", used_s, longest_s):
+        for integration_s in session.decide("integration", used_s, longest_s):
             repetitions = self.readings.repetitions
             session.perform(ReadSpectrum(CardSpectra.DARK, integration_s, repetitions))
 
 
-class Irradiance(ScenesProtocol):
+class Irradiance(ConfiguredProtocol):
     """Settings of an irradiance measurement; `irradiance.yaml` is the commented example.
 
     Attributes
@@ -219,9 +217,11 @@ class Irradiance(ScenesProtocol):
         """Bracketing with which the card is photographed."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, then the card by itself and through the LVF in turn, as the lamp drifts."""
-        dark = Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True)
+        dark = ConfiguredUnit(
+            StillDarkUnit(self.bracketing), BenchConfiguration(), "", is_dark=True
+        )
         rounds = (self._round(number) for number in range(1, self.rounds + 1))
         scenes = [dark, *(scene for scenes in rounds for scene in scenes)]
         if self.select is None:
@@ -229,7 +229,7 @@ class Irradiance(ScenesProtocol):
         most = self.rounds * (1 + len(self.select.names()))
         return [
             *scenes,
-            Scene(DarkSpectraUnit(self._readings, most), _DIRECT, "the lights are off"),
+            ConfiguredUnit(DarkSpectraUnit(self._readings, most), _DIRECT, "the lights are off"),
         ]
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
@@ -237,26 +237,26 @@ class Irradiance(ScenesProtocol):
         needed = (LVF_KIND,) if self.select is None else ()
         return [kind.protocol for kind in needed if rig.optics.named(kind) is None]
 
-    def _round(self, number: int) -> Sequence[Scene]:
+    def _round(self, number: int) -> Sequence[ConfiguredUnit]:
         scene = (self.bracketing, f"direct-{number}", CardFrames.DIRECT)
         if self.select is not None:
             card = CardUnit(*scene, readings=self._readings, spectrum=CardSpectra.DIRECT)
             return (
-                Scene(card, _DIRECT, "how bright the lamp is by itself"),
+                ConfiguredUnit(card, _DIRECT, "how bright the lamp is by itself"),
                 *self._lights(self.select, number),
             )
         direct = SceneUnit(*scene)
         through = StripUnit(self.bracketing, f"through-{number}", CardFrames.THROUGH)
         return (
-            Scene(direct, _DIRECT, "how bright the lamp is by itself"),
-            Scene(through, _THROUGH, "how much of it the variable filter leaves"),
+            ConfiguredUnit(direct, _DIRECT, "how bright the lamp is by itself"),
+            ConfiguredUnit(through, _THROUGH, "how much of it the variable filter leaves"),
         )
 
     @property
     def _readings(self) -> SpectrumReadings:
         return SpectrumReadings(self.integration, self.repetitions)
 
-    def _lights(self, lights: ExcitingLights, number: int) -> Iterator[Scene]:
+    def _lights(self, lights: ExcitingLights, number: int) -> Iterator[ConfiguredUnit]:
         """Yield the card under one light after another."""
         for name in lights.names():
             scene = (self.bracketing, light_unit(name, number), CardFrames.THROUGH)
@@ -265,4 +265,6 @@ class Irradiance(ScenesProtocol):
                 if lights.leds
                 else CardUnit(*scene, readings=self._readings)
             )
-            yield Scene(unit, lights.arrangement(name, "grey card"), "how bright this light is")
+            yield ConfiguredUnit(
+                unit, lights.configuration(name, "grey card"), "how bright this light is"
+            )

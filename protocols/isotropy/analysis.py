@@ -10,7 +10,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.calibration import BLANK_KIND, CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
@@ -28,7 +28,7 @@ from labrig.results import Measured, Series
 BEFORE, AFTER = "angle-before", "angle-after"
 
 
-def analyse(part: Part) -> IsotropyResult:
+def analyse(context: AnalysisContext) -> IsotropyResult:
     """Measure the radiance at each angle relative to the straight view.
 
     Raises
@@ -36,12 +36,12 @@ def analyse(part: Part) -> IsotropyResult:
     DataError
         A straight view or all others are missing, or frames are damaged.
     """
-    protocol, run, camera = part.protocol, part.run, part.inputs[CAMERA_KIND]
+    protocol, run, camera = context.protocol, context.run, context.inputs[CAMERA_KIND]
     frames, stray = without_stray_light(
-        intact_frames(run, part.overrides, protocol.role), part.inputs[BLANK_KIND]
+        intact_frames(run, context.overrides, protocol.role), context.inputs[BLANK_KIND]
     )
     require_calibrated_camera(camera, run, run.frames(protocol.role))
-    regions = part.overrides.patches(protocol)
+    regions = context.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     encloses_sample = protocol.patch == "around"

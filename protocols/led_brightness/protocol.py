@@ -14,6 +14,8 @@ from pydantic import Field
 from labrig.acquire import SPECTROMETER, Session, Unit
 from labrig.foundation.quantity import Count, DurationS
 from labrig.foundation.region import CENTRE, Region
+from labrig.protocols.steps.bench_configuration import RestoreBench, WithConfiguration
+from labrig.protocols.steps.bracketing import StillDarkUnit
 from labrig.protocols.steps.led_scenes import (
     AGAIN,
     CARD,
@@ -24,7 +26,6 @@ from labrig.protocols.steps.led_scenes import (
     LedUnit,
 )
 from labrig.protocols.steps.led_spectra import SpectrumReadings
-from labrig.protocols.steps.scenes import Arranged, PutBackUnit, StillDarkUnit
 
 
 class BrightnessFrames(StrEnum):
@@ -61,9 +62,9 @@ class LedBrightness(LedSettings):
         first, *others = [*(self._unit(led, CARD) for led in order), self._unit(order[0], AGAIN)]
         return [
             StillDarkUnit(self.bracketing),
-            Arranged(first, ON_CARD, ON_SAMPLE, CARD_REASON),
+            WithConfiguration(first, ON_CARD, ON_SAMPLE, CARD_REASON),
             *others,
-            PutBackUnit(ON_CARD),
+            RestoreBench(ON_CARD),
         ]
 
     def _unit(self, led: str, begin: str) -> "BrightnessUnit":

@@ -11,6 +11,8 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import Unit
+from labrig.protocols.steps.bench_configuration import RestoreBench, WithConfiguration
+from labrig.protocols.steps.bracketing import StillDarkUnit
 from labrig.protocols.steps.led_scenes import (
     AGAIN,
     CARD,
@@ -24,7 +26,6 @@ from labrig.protocols.steps.led_scenes import (
     LitUnit,
 )
 from labrig.protocols.steps.patch_names import Patches
-from labrig.protocols.steps.scenes import Arranged, PutBackUnit, StillDarkUnit
 
 
 class LedFrames(StrEnum):
@@ -80,12 +81,12 @@ class LedFluorescence(LedSettings):
         sample = "it is photographed under every LED"
         return [
             StillDarkUnit(self.bracketing),
-            Arranged(cards[0], ON_CARD, ON_SAMPLE, CARD_REASON),
+            WithConfiguration(cards[0], ON_CARD, ON_SAMPLE, CARD_REASON),
             *cards[1:],
-            Arranged(samples[0], ON_SAMPLE, ON_CARD, sample),
+            WithConfiguration(samples[0], ON_SAMPLE, ON_CARD, sample),
             *samples[1:],
             *again,
-            PutBackUnit(ON_SAMPLE),
+            RestoreBench(ON_SAMPLE),
         ]
 
     def _card(self, led: str) -> LedUnit:

@@ -39,6 +39,13 @@ from labrig.foundation.region import CENTRE
 from labrig.material import read_material
 from labrig.optics import read_spectrum
 from labrig.protocols.steps.afterglow import Afterglow, dark_level, glow
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    RestoreBench,
+    WithConfiguration,
+    light,
+)
+from labrig.protocols.steps.bracketing import Bracketing
 from labrig.protocols.steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, Iso
 from labrig.protocols.steps.darkness import levels, range_dn
 from labrig.protocols.steps.exposure_metering import TARGET, MeteringFrame, measure_frame
@@ -52,7 +59,6 @@ from labrig.protocols.steps.sample_pose import (
     lights_out,
 )
 from labrig.protocols.steps.sanity_checks import SanityChecks
-from labrig.protocols.steps.scenes import Arranged, Arrangement, Bracketing, PutBackUnit, light
 from labrig.record import FrameRecord, FrameRole
 from labrig.results import (
     VISIBLE_MCD_PER_M2,
@@ -91,8 +97,8 @@ AT_EITHER = 2
 FADES_BY_S, FADED = 60.0, 0.02
 #: Part of 0.3 mcd/m² at which the run may end, by an estimate of the luminance.
 ENOUGH = 0.5
-#: Arrangement of the bench for the card, and its reason.
-CARD = Arrangement("grey card")
+#: BenchConfiguration of the bench for the card, and its reason.
+CARD = BenchConfiguration("grey card")
 WHY_CARD = "its light under the lamp is the scale of luminances"
 #: Frames of the card, and the longest exposure of it in seconds.
 CARD_FRAMES, CARD_LONGEST_S = 6, 2.0
@@ -328,7 +334,7 @@ class Luminance(ProtocolModel):
         """Luminance to which eyes are adapted in mcd/m²."""
         return None if self.adaptation is None else _mcd_per_m2(self.adaptation)
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the protocol with the card's luminance by the rig file's reading.
 
         Raises
@@ -367,9 +373,9 @@ class Luminance(ProtocolModel):
     def units(self) -> Sequence[Unit]:
         """Return darks at every ISO, card and glow, the bench put back."""
         darks = [LuminanceDarkUnit(self, iso) for iso in self.isos()]
-        card = Arranged(CardUnit(self), CARD, Arrangement(), WHY_CARD)
+        card = WithConfiguration(CardUnit(self), CARD, BenchConfiguration(), WHY_CARD)
         if self.card == "after":
-            return [*darks, GlowUnit(self), card, PutBackUnit(CARD)]
+            return [*darks, GlowUnit(self), card, RestoreBench(CARD)]
         return [*darks, card, GlowUnit(self)]
 
     def isos(self) -> list[int]:
@@ -514,17 +520,21 @@ class GlowUnit:
             if not is_over:
                 shots = self._photograph(session, begin_s, off_s, iso)
                 last_s, iso = shots.begins_s[-1], shots.settings[-1].iso
-                is_over = session.choose("dim enough", lambda: self._is_dim(session), worst=False)
+                is_over = session.decide(
+                    "dim enough", lambda: self._is_dim(session), when_planned=False
+                )
             if not is_checked and (is_over or last_s > FADES_BY_S):
-                session.choose(
-                    "after lamp off", lambda: self._afterglow(session), worst=Afterglow.FADING
+                session.decide(
+                    "after lamp off",
+                    lambda: self._afterglow(session),
+                    when_planned=Afterglow.FADING,
                 ).require(session.warn)
                 is_checked = True
 
     def _photograph(self, session: Session, begin_s: float, off_s: float, iso: int) -> Shots:
         """Take the next frames from a time after lamp off, and return them."""
         offers = session.rig[CAMERA].offers()
-        shots = session.choose(
+        shots = session.decide(
             "exposures",
             lambda: self._next(session, begin_s, iso, offers),
             self._longest(begin_s, iso, offers),
@@ -538,16 +548,16 @@ class GlowUnit:
     def _excite(self, session: Session) -> None:
         """Light the rested sample with the warm lamp for the time of the excitation."""
         protocol = self.protocol
-        if session.choose("first in its session", lambda: _is_first(session), worst=False):
+        if session.decide("first in its session", lambda: _is_first(session), when_planned=False):
             session.warn(
                 "the run was resumed: if the lamp has shone on the sample since, let it rest as "
                 "long as before and begin a new run"
             )
         if protocol.card == "before":
             if not session.rig[LAMP].is_on():  # as in a resumed run
-                CARD.set_up(session, Arrangement(), "it covers the sample meanwhile")
+                CARD.set_up(session, BenchConfiguration(), "it covers the sample meanwhile")
                 light(session, session.rig.warm_up_s("lamp"))
-            Arrangement().set_up(session, CARD, "the excitation begins")
+            BenchConfiguration().set_up(session, CARD, "the excitation begins")
         else:
             if has_door(session):
                 face_camera(session)

@@ -20,18 +20,15 @@ from labrig.acquire import (
 )
 from labrig.foundation.quantity import Count, DurationS, WordOrDuration
 from labrig.optics import read_transmittance
-from labrig.protocols.steps.camera_settings import MARGIN_S, CameraSettings
-from labrig.protocols.steps.sample_pose import charge, face_lamp, lights_out, visible_after_s
-from labrig.protocols.steps.scenes import (
-    Arrangement,
-    Bracketing,
-    Scene,
-    ScenesProtocol,
-    SceneUnit,
-    StillDarkUnit,
-    frames_of,
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
     light,
 )
+from labrig.protocols.steps.bracketing import Bracketing, SceneUnit, StillDarkUnit, frames_of
+from labrig.protocols.steps.camera_settings import MARGIN_S, CameraSettings
+from labrig.protocols.steps.sample_pose import charge, face_lamp, lights_out, visible_after_s
 from labrig.protocols.steps.strip_scenes import NO_FILTER, LvfFrames, StripUnit, filter_unit
 
 #: Shutter times of the stripes' photographs, as fractions of the longest.
@@ -55,10 +52,10 @@ class LinesUnit(SceneUnit):
 
     def check(self, session: Session) -> None:
         """Check that the mercury lines are visible, the right way round."""
-        session.choose("mercury", lambda: self._lines(session), worst="lines found")
+        session.decide("mercury", lambda: self._lines(session), when_planned="lines found")
 
     def _lines(self, session: Session) -> str:
-        from labrig.protocols.steps.strip_checks import lines_found
+        from labrig.protocols.steps.strip_scenes import lines_found
 
         return lines_found(self.own(session), frames_of(session, *self.strip), self.rising)
 
@@ -78,8 +75,8 @@ class FilterUnit(SceneUnit):
 
     def check(self, session: Session) -> None:
         """Warn of a filter that seems not to be in its place."""
-        if session.choose(
-            "like the picture before", lambda: self._is_like_previous(session), worst=False
+        if session.decide(
+            "like the picture before", lambda: self._is_like_previous(session), when_planned=False
         ):
             session.warn(
                 f"the picture with the colour filter {self.filter} is like the one before "
@@ -92,7 +89,7 @@ class FilterUnit(SceneUnit):
         return filter_unit(self.previous)
 
     def _is_like_previous(self, session: Session) -> bool:
-        from labrig.protocols.steps.strip_checks import look_alike
+        from labrig.protocols.steps.strip_scenes import look_alike
 
         previous = frames_of(session, self.role, self._unit_before)
         strip = frames_of(session, self.role, filter_unit(None))
@@ -130,11 +127,11 @@ class StripesUnit(SceneUnit):
 FilterCount = Annotated[int, Field(ge=6, strict=True)]
 FilterName = Annotated[str, Field(min_length=1, pattern=r"^[^/\\]+$")]
 
-_CARD = Arrangement("grey card")
-_ON_SAMPLE = Arrangement("grey card", "on sample")
-_BEFORE_CAMERA = Arrangement("grey card", "before camera")
+_CARD = BenchConfiguration("grey card")
+_ON_SAMPLE = BenchConfiguration("grey card", "on sample")
+_BEFORE_CAMERA = BenchConfiguration("grey card", "before camera")
 
-#: Reason for a scene's arrangement, by the role of its frames.
+#: Reason for a scene's configuration, by the role of its frames.
 _WHY: dict[str, str] = {
     LvfFrames.CARD: "how bright the card is at every place by itself",
     LvfFrames.STRIP_ON_SAMPLE: "where the filter's strip falls on the sample",
@@ -145,7 +142,7 @@ _WHY: dict[str, str] = {
 }
 
 
-class LvfCalibration(ScenesProtocol):
+class LvfCalibration(ConfiguredProtocol):
     """Settings of the calibration of an LVF; `lvf_calibration.yaml` is the commented example.
 
     Attributes
@@ -202,10 +199,10 @@ class LvfCalibration(ScenesProtocol):
         return Bracketing(self.camera, self.longest, self.repeats)
 
     def filter_names(self) -> tuple[str, ...]:
-        """Return the names of the colour filters; before `suited_to`, of those that are shipped."""
+        """Return the names of the colour filters; before `resolved_for`, of the shipped ones."""
         return self.filters if isinstance(self.filters, tuple) else self._chosen(Optics())
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the protocol with the names of the filters, of those in the rig file's folder."""
         if isinstance(self.filters, tuple):
             return self
@@ -225,41 +222,48 @@ class LvfCalibration(ScenesProtocol):
             self.filters,
         )
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return first what can go wrong, the strip and its lines, then filter by filter."""
         return [
-            Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True),
+            ConfiguredUnit(StillDarkUnit(self.bracketing), BenchConfiguration(), "", is_dark=True),
             *self._lit_scenes(),
         ]
 
-    def _lit_scenes(self) -> Iterator[Scene]:
+    def _lit_scenes(self) -> Iterator[ConfiguredUnit]:
         none, strip = filter_unit(None), LvfFrames.STRIP_ON_SAMPLE
         yield self._scene(SceneUnit, "card", LvfFrames.CARD, _CARD)
         yield self._scene(StripUnit, strip_unit := "strip-on-sample", strip, _ON_SAMPLE)
         yield self._scene(StripUnit, none, LvfFrames.FILTER, _BEFORE_CAMERA)
-        arrangement = replace(_BEFORE_CAMERA, lamp="mercury")
+        configuration = replace(_BEFORE_CAMERA, lamp="mercury")
         keys: dict[str, Any] = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
-        yield self._scene(LinesUnit, "lines", LvfFrames.LINES, arrangement, **keys)
-        arrangement = replace(_ON_SAMPLE, lamp="mercury")
+        yield self._scene(LinesUnit, "lines", LvfFrames.LINES, configuration, **keys)
+        configuration = replace(_ON_SAMPLE, lamp="mercury")
         keys = {"strip": (strip, strip_unit), "rising": self.rising_on_sample}
         yield self._scene(
-            LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, arrangement, **keys
+            LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, configuration, **keys
         )
         if isinstance(self.stripes, float):
-            arrangement = replace(arrangement, stage="sample")
+            configuration = replace(configuration, stage="sample")
             yield self._scene(
-                StripesUnit, "stripes", LvfFrames.STRIPES, arrangement, charge_s=self.stripes
+                StripesUnit, "stripes", LvfFrames.STRIPES, configuration, charge_s=self.stripes
             )
         previous = None
         for name in self.filter_names():
-            arrangement = replace(_BEFORE_CAMERA, filter=name)
+            configuration = replace(_BEFORE_CAMERA, filter=name)
             keys = {"filter": name, "previous": previous}
-            yield self._scene(FilterUnit, filter_unit(name), LvfFrames.FILTER, arrangement, **keys)
+            yield self._scene(
+                FilterUnit, filter_unit(name), LvfFrames.FILTER, configuration, **keys
+            )
             previous = name
 
     def _scene(
-        self, kind: type[SceneUnit], name: str, role: str, arrangement: Arrangement, **keys: Any
-    ) -> Scene:
+        self,
+        kind: type[SceneUnit],
+        name: str,
+        role: str,
+        configuration: BenchConfiguration,
+        **keys: Any,
+    ) -> ConfiguredUnit:
         mercury_s = self.mercury_warm_up
-        unit = kind(self.bracketing, name, role, arrangement.lamp, mercury_s, **keys)
-        return Scene(unit, arrangement, _WHY[role])
+        unit = kind(self.bracketing, name, role, configuration.lamp, mercury_s, **keys)
+        return ConfiguredUnit(unit, configuration, _WHY[role])

@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping
 
-from labrig.analyse.chain import analyse_parts
-from labrig.analyse.inputs import Inputs, Part
+from labrig.analyse.inputs import AnalysisContext, Inputs, analyse_parts
 from labrig.analyse.surface import with_reflectances
 from labrig.calibration import REFLECTANCE_KIND
 from labrig.material import Material
 from labrig.protocols.phosphor.result import PhosphorResult
 
 
-def analyse(part: Part) -> PhosphorResult:
+def analyse(context: AnalysisContext) -> PhosphorResult:
     """Analyse every part of a chain; each may use the results of earlier ones.
 
     Raises
@@ -18,7 +17,7 @@ def analyse(part: Part) -> PhosphorResult:
     DataError, FitError
         No part can be analysed.
     """
-    analysed = analyse_parts(part)
+    analysed = analyse_parts(context)
     return PhosphorResult(
         parts=analysed.results,
         failed=analysed.failed,

@@ -25,10 +25,10 @@ from labrig.foundation.errors import ProtocolError
 from labrig.foundation.plugins import measurement, measurements
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
+from labrig.protocols.steps.bench_configuration import BenchConfiguration, ConfiguredUnit, in_turn
 from labrig.protocols.steps.chain import Chain, Part
 from labrig.protocols.steps.patch_names import FilterPatches, sample_folders
-from labrig.protocols.steps.sample_turns import SampleScene, in_sample_turns
-from labrig.protocols.steps.scenes import Arrangement, Scene, in_turn
+from labrig.protocols.steps.sample_turns import SampleTurn, in_sample_turns
 
 #: Why samples do not rest while another one is measured.
 NOT_DARK = (
@@ -104,7 +104,7 @@ class Phosphor(Chain):
                 "frame none can rest while another is lit"
             )
         for part in self._links():
-            if any(scene.arrangement.stage == "lit sample" for scene in part.scenes()):
+            if any(scene.configuration.stage == "lit sample" for scene in part.configured_units()):
                 raise ValueError(
                     f"expected parts that leave the samples on their changer, got '{part.name}', "
                     "which has them laid elsewhere by hand; run it with one sample"
@@ -164,7 +164,7 @@ class Phosphor(Chain):
             *(part.of_sample(sample) for sample in self.samples for part in own),
         )
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the chain without the parts whose calibrations the rig has, beginning by a check.
 
         The check compares the bench with that of the calibration; it needs the filter at hand.
@@ -178,11 +178,11 @@ class Phosphor(Chain):
             there.
         """
         if self.samples:
-            rests = self._rests_on(rig)
+            rests = self._sharing(rig)
             if rests != self.rests:
-                return self.model_copy(update={"rests": rests}).suited_to(rig)
+                return self.model_copy(update={"rests": rests}).resolved_for(rig)
         if self.calibrate == "always":
-            return super().suited_to(rig)
+            return super().resolved_for(rig)
         known = {kind.protocol for kind in kinds() if rig.optics.named(kind) is not None}
         chain = list(zip(self.parts, self._links(), strict=True))
         kept = [
@@ -191,7 +191,7 @@ class Phosphor(Chain):
             if part.registered.of != "bench" or part.protocol.protocol not in known
         ]
         if not kept:
-            return super().suited_to(rig)
+            return super().resolved_for(rig)
         parts = [content for content, _ in kept]
         registered = [part.registered for _, part in kept]
         reference = calibration(rig, REFERENCE_KIND)
@@ -200,9 +200,9 @@ class Phosphor(Chain):
         if can_be_checked and is_needed and not any(each.is_bench_check for each in registered):
             check = next(name for name, each in measurements() if each.is_bench_check)
             parts.insert(0, {"protocol": check})
-        return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).suited_to(rig)
+        return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).resolved_for(rig)
 
-    def _rests_on(self, rig: RigFile) -> Literal["shared", "apart"]:
+    def _sharing(self, rig: RigFile) -> Literal["shared", "apart"]:
         """Return whether rests are shared on the sample changer of a rig.
 
         Raises
@@ -219,10 +219,10 @@ class Phosphor(Chain):
             )
         changer = planned_rig(rig, source, (SAMPLE_CHANGER.key,))[SAMPLE_CHANGER]
         for sample in self.samples:
-            if sample.name not in changer.samples():
+            if sample.name not in changer.names():
                 raise ProtocolError(
                     f"samples: the sample changer of the {source} has no '{sample.name}'; "
-                    f"{did_you_mean(sample.name, changer.samples())}"
+                    f"{did_you_mean(sample.name, changer.names())}"
                 )
         if self.rests == "shared" and not changer.keeps_dark():
             raise ProtocolError(f"rests: shared is not possible: {NOT_DARK}")
@@ -234,11 +234,11 @@ class Phosphor(Chain):
         """Return why rests are shared or not, and the time in the lab with the other way."""
         if not self.samples:
             return super().notes(rig)
-        driver, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
+        _, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
         apart = self._lab_time("apart", rig)
-        if driver.declared_keeps_dark(settings):
+        if settings.keeps_dark:
             shared = self._lab_time("shared", rig)
-            if self._rests_on(rig) == "shared":
+            if self._sharing(rig) == "shared":
                 return (
                     f"one sample rests in the dark while another is measured: at most {shared} in "
                     f"the lab, one sample after the other {apart}",
@@ -258,7 +258,7 @@ class Phosphor(Chain):
         return duration_text(plan(chain, rig, f"rig '{rig.name}'").duration_s)
 
     def units(self) -> Sequence[Unit]:
-        """Return the units of all parts in order; on a checked bench, by arrangement."""
+        """Return the units of all parts in order; on a checked bench, by configuration."""
         registered = [part.registered for part in self._links()]
         calibrates = any(each.of == "bench" and each.calibration for each in registered)
         is_checked = any(each.is_bench_check for each in registered) and not calibrates
@@ -267,22 +267,24 @@ class Phosphor(Chain):
         chain = self.chain()
         if not is_checked:
             return [PartUnit(part.name, unit) for part in chain for unit in part.protocol.units()]
-        scenes = sorted(((part, scene) for part in chain for scene in part.scenes()), key=_turn)
+        scenes = sorted(
+            ((part, scene) for part in chain for scene in part.configured_units()), key=_turn
+        )
         return in_turn(_darks_as_next([scene for _, scene in scenes]))
 
     def _units_of_samples(self, *, is_checked: bool) -> Sequence[Unit]:
         """Return the units of the bench, then those of all samples."""
         chain = self.chain()
-        own: dict[str, list[SampleScene]] = {}
+        own: dict[str, list[SampleTurn]] = {}
         for sample in self.samples:
             scenes = [
                 (part, scene)
                 for part in chain
                 if part.sample == sample.name
-                for scene in part.scenes()
+                for scene in part.configured_units()
             ]
             own[sample.name] = [
-                SampleScene(part.protocol.protocol, scene)
+                SampleTurn(part.protocol.protocol, scene)
                 for part, scene in (sorted(scenes, key=_turn) if is_checked else scenes)
             ]
         of_samples = in_sample_turns(own, shared=self.rests == "shared")
@@ -290,7 +292,9 @@ class Phosphor(Chain):
         if not is_checked:
             units = [PartUnit(part.name, unit) for part in of_all for unit in part.protocol.units()]
             return [*units, *in_turn(of_samples)]
-        check = sorted(((part, scene) for part in of_all for scene in part.scenes()), key=_turn)
+        check = sorted(
+            ((part, scene) for part in of_all for scene in part.configured_units()), key=_turn
+        )
         return in_turn(_darks_as_next([*(scene for _, scene in check), *of_samples]))
 
 
@@ -300,28 +304,28 @@ def _with_dark_places(rig: RigFile) -> RigFile:
     return rig.model_copy(update={"devices": {**rig.devices, SAMPLE_CHANGER.key: changer}})
 
 
-def _darks_as_next(scenes: Sequence[Scene]) -> list[Scene]:
-    """Return the scenes with dark frames taken in the arrangement of the scene after them."""
-    arranged: list[Scene] = []
+def _darks_as_next(scenes: Sequence[ConfiguredUnit]) -> list[ConfiguredUnit]:
+    """Return the scenes with dark frames taken in the configuration of the scene after them."""
+    arranged: list[ConfiguredUnit] = []
     for scene in reversed(scenes):
         if scene.is_dark and arranged:
             following = arranged[-1]
-            scene = replace(scene, arrangement=following.arrangement, why=following.why)
+            scene = replace(scene, configuration=following.configuration, why=following.why)
         arranged.append(scene)
     return arranged[::-1]
 
 
-def _turn(scene_of: tuple[Part, Scene]) -> int:
-    """Return the place of a part's scene in the order of the bench's arrangements.
+def _turn(scene_of: tuple[Part, ConfiguredUnit]) -> int:
+    """Return the place of a part's scene in the order of the bench's configurations.
 
     The card comes first, while camera and lamp warm up, then dark frames. The sample's own longest
     charge comes last: nothing has to wait until its glow is gone.
     """
     part, scene = scene_of
-    wanted = scene.arrangement
+    wanted = scene.configuration
     if wanted.stage != "sample":
         return 0
-    if scene.is_dark and wanted == Arrangement():
+    if scene.is_dark and wanted == BenchConfiguration():
         return 1
     if wanted.lvf != "away":
         return 2 if wanted.lvf == "before camera" else 3

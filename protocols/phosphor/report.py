@@ -11,11 +11,11 @@ from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, Spectrum, compare_materials, read_material
 from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import FrameRecord, FrameRole
-from labrig.report.chain import render_chain
 from labrig.report.colours import Screen, screen_for, spectrum_colour
 from labrig.report.decay_figures import logarithmic_decay
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
+from labrig.report.renderers import render_chain
 from labrig.report.report_model import GlowPhotograph
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.report.spectrum_figure import spectrum_figure

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from labrig.foundation.output_file import make_folder_in
 from labrig.material import Material, write_material
-from labrig.results.chain_result import ChainResult
+from labrig.results.run_result import ChainResult
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

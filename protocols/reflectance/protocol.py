@@ -25,18 +25,15 @@ from labrig.acquire import (
 )
 from labrig.calibration import LVF_KIND
 from labrig.foundation.quantity import Count, DurationS
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    ConfiguredProtocol,
+    ConfiguredUnit,
+    LvfPlace,
+)
+from labrig.protocols.steps.bracketing import LONGER, Bracketing, SceneUnit, StillDarkUnit
 from labrig.protocols.steps.camera_settings import MARGIN_S, CameraSettings
 from labrig.protocols.steps.patch_names import FilterPatches
-from labrig.protocols.steps.scenes import (
-    LONGER,
-    Arrangement,
-    Bracketing,
-    LvfPlace,
-    Scene,
-    ScenesProtocol,
-    SceneUnit,
-    StillDarkUnit,
-)
 from labrig.protocols.steps.strip_scenes import StripUnit
 
 
@@ -56,12 +53,12 @@ GLOW_FIRST_S = 0.6
 #: Number of exposures of the glow, each `LONGER` times the one before.
 GLOW_EXPOSURES = 3
 
-#: Reasons for the arrangements.
+#: Reasons for the configurations.
 _WHITE = "all light that comes back is seen at one wavelength after the other"
 _NARROW = "each place is lit by one wavelength, so that fluorescence shows as another colour"
 
 
-class Reflectance(ScenesProtocol):
+class Reflectance(ConfiguredProtocol):
     """Settings of a measurement of reflectance; `reflectance.yaml` is the commented example.
 
     Attributes
@@ -82,7 +79,7 @@ class Reflectance(ScenesProtocol):
         Default: one material.
     """
 
-    rests_on = (LVF_KIND,)
+    requires = (LVF_KIND,)
 
     protocol: Literal["reflectance"] = "reflectance"
     camera: CameraSettings = CameraSettings(iso=100)
@@ -96,9 +93,11 @@ class Reflectance(ScenesProtocol):
         """Bracketing with which card and sample are photographed."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, then the sample between two cards: by white light, by narrow light."""
-        dark = Scene(StillDarkUnit(self.bracketing), Arrangement(), "", is_dark=True)
+        dark = ConfiguredUnit(
+            StillDarkUnit(self.bracketing), BenchConfiguration(), "", is_dark=True
+        )
         white = self._lit(
             "white", "before camera", _WHITE,
             ReflectanceFrames.CARD_WHITE, ReflectanceFrames.SAMPLE_WHITE,
@@ -113,14 +112,14 @@ class Reflectance(ScenesProtocol):
 
     def _lit(
         self, light: str, lvf: LvfPlace, why: str, card: str, sample: str, glow: str
-    ) -> tuple[Scene, Scene, Scene]:
+    ) -> tuple[ConfiguredUnit, ConfiguredUnit, ConfiguredUnit]:
         """Return the sample between two cards in one light."""
-        scene, on_card = self.bracketing, Arrangement("grey card", lvf)
+        scene, on_card = self.bracketing, BenchConfiguration("grey card", lvf)
         lit = LitSampleUnit(scene, f"sample-{light}", sample, charge_s=self.charge, glow_role=glow)
         return (
-            Scene(StripUnit(scene, f"card-{light}-1", card), on_card, why),
-            Scene(lit, Arrangement("lit sample", lvf), why),
-            Scene(StripUnit(scene, f"card-{light}-2", card), on_card, why),
+            ConfiguredUnit(StripUnit(scene, f"card-{light}-1", card), on_card, why),
+            ConfiguredUnit(lit, BenchConfiguration("lit sample", lvf), why),
+            ConfiguredUnit(StripUnit(scene, f"card-{light}-2", card), on_card, why),
         )
 
 

@@ -15,12 +15,16 @@ from labrig.acquire import CameraOffers, ManualStep, ProtocolModel, Unit
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.foundation.region import CENTRE
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    WithConfiguration,
+    WithManualStep,
+)
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.decays import DecaySettings, DecayUnit
 from labrig.protocols.steps.glow import DarkUnit, MeterUnit
 from labrig.protocols.steps.patch_names import Patches
 from labrig.protocols.steps.random_spacing import Spacing
-from labrig.protocols.steps.scenes import Arranged, Arrangement, Prepared
 
 
 class Light(StrEnum):
@@ -76,15 +80,19 @@ class WeakerLight(FrozenModel):
     def begun(self, unit: Unit) -> Unit:
         """Return `unit` with the light weakened before it."""
         if self.filter is not None:
-            return Arranged(unit, Arrangement(filter=self.filter), Arrangement(), WHY)
+            return WithConfiguration(
+                unit, BenchConfiguration(filter=self.filter), BenchConfiguration(), WHY
+            )
         instruction = f"move the lamp to a distance of {self.distance} from the sample"
-        return Prepared(unit, ManualStep(instruction, WHY, f"lamp at {self.distance}"))
+        return WithManualStep(unit, ManualStep(instruction, WHY, f"lamp at {self.distance}"))
 
     def ended(self, unit: Unit) -> Unit:
         """Return `unit` with the light restored before it."""
         if self.filter is not None:
-            return Arranged(unit, Arrangement(), Arrangement(filter=self.filter), WHY)
-        return Prepared(unit, ManualStep("move the lamp back", WHY, "lamp back"))
+            return WithConfiguration(
+                unit, BenchConfiguration(), BenchConfiguration(filter=self.filter), WHY
+            )
+        return WithManualStep(unit, ManualStep("move the lamp back", WHY, "lamp back"))
 
 
 class Saturation(ProtocolModel):

@@ -11,8 +11,8 @@ from scipy.special import chdtrc, fdtrc
 from labrig.foundation.arrays import FloatArray
 from labrig.results.budget import Budget, named
 from labrig.results.fitted_decay import FittedDecay
+from labrig.results.fitted_excitation import THICKNESS
 from labrig.results.fitted_law import EXPONENTIALS
-from labrig.results.layer_effect import THICKNESS
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv

@@ -1,1 +1,1 @@
-"""Common parts of protocols: pose, rest, exposure, checks, arrangement."""
+"""Common parts of protocols: pose, rest, exposure, checks, configuration."""

@@ -11,7 +11,7 @@ from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import validate
 from labrig.record import unit_in, unit_within
 
-from .scenes import Arrangement, Scene, ScenesProtocol
+from .bench_configuration import BenchConfiguration, ConfiguredProtocol, ConfiguredUnit
 
 ANOTHER = "expected 'protocol: NAME' in every part, the name of another one that is no chain"
 
@@ -76,10 +76,10 @@ class Chain(ProtocolModel):
                     regions[f"{part.name}: {key}"] = region
         return regions
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the chain with the keys filled in that its parts leave to the rig file."""
         parts = [
-            content | _changed(part.protocol, part.protocol.suited_to(rig))
+            content | _changed(part.protocol, part.protocol.resolved_for(rig))
             for content, part in zip(self.parts, self._links(), strict=True)
         ]
         return self.model_copy(update={"parts": tuple(parts)})
@@ -154,16 +154,19 @@ class Part:
             raise ValueError(ANOTHER)
         return cls(name, validate(keys, model, f"part {name}"), registered)
 
-    def scenes(self) -> list[Scene]:
+    def configured_units(self) -> list[ConfiguredUnit]:
         """Return the part's scenes, with the names that its units have in the chain.
 
         Of a protocol without scenes all units want the bench as usual, and put it back.
         """
         protocol = self.protocol
-        if isinstance(protocol, ScenesProtocol):
-            return [scene.of_part(self.name) for scene in protocol.scenes()]
+        if isinstance(protocol, ConfiguredProtocol):
+            return [scene.of_part(self.name) for scene in protocol.configured_units()]
         why = f"{self.name} begins so"
-        return [Scene(PartUnit(self.name, unit), Arrangement(), why) for unit in protocol.units()]
+        return [
+            ConfiguredUnit(PartUnit(self.name, unit), BenchConfiguration(), why)
+            for unit in protocol.units()
+        ]
 
 
 def _changed(original: ProtocolModel, completed: ProtocolModel) -> dict[str, Any]:

@@ -1,14 +1,17 @@
-"""A ColorChecker under the lamp of the relay, by itself and beside a grey card in its place."""
+"""A ColorChecker under the lamp of the relay, by itself and beside a grey card; its checks."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from labrig.acquire import Session
+from labrig.record import FrameRecord
+from labrig.reduce import find_colour_chart
 
-from .scenes import SceneUnit
+from .bracketing import SceneUnit
 
 #: Names of the units of the card and of the chart, and of the card through a variable filter.
 CARD_UNIT, CHART_UNIT, THROUGH_UNIT = "card", "chart", "card-through"
-#: Reasons for the arrangements, for the person.
+#: Reasons for the configurations, for the person.
 WHY_CARD = "its light at every place tells how evenly the chart will be lit"
 WHY_CHART = "its patches are known"
 WHY_THROUGH = "it tells what filter and camera see at every wavelength"
@@ -20,10 +23,20 @@ class ChartUnit(SceneUnit):
 
     def check(self, session: Session) -> None:
         """Check that the chart is found in the picture."""
-        session.choose("colour chart", lambda: self._chart(session), worst="found")
+        session.decide("colour chart", lambda: chart_found(self.own(session)), when_planned="found")
 
-    def _chart(self, session: Session) -> str:
-        # Takes a while to load, and plans do without.
-        from .chart_checks import chart_found
 
-        return chart_found(self.own(session))
+def chart_found(frames: Sequence[FrameRecord]) -> str:
+    """Return where the chart is, in words.
+
+    Raises
+    ------
+    DataError
+        No chart is found, see `find_colour_chart`.
+    """
+    # The shortest exposure of a bracket is metered: nothing clips.
+    metered = min(frames, key=lambda frame: frame.exposure_s)
+    patches = find_colour_chart(metered.path)
+    middles = [(x + wide / 2, y + high / 2) for x, y, wide, high in patches]
+    x, y = (sum(values) / len(values) for values in zip(*middles, strict=True))
+    return f"{len(patches)} patches about {x:.0%} across and {y:.0%} down the frame"

@@ -17,7 +17,6 @@ from labrig.acquire import (
     LAMP_ON,
     SHIELD,
     CameraOffers,
-    ExposureSettings,
     RigFile,
     Session,
     Shoot,
@@ -31,10 +30,10 @@ from labrig.foundation.region import CENTRE, Region
 from labrig.record import FrameRole
 from labrig.reduce import FrameMeasurement
 
+from .bench_configuration import BenchConfiguration, ConfiguredProtocol, ConfiguredUnit
 from .camera_settings import (
     DARKS_PER_EXPOSURE,
     MARGIN_S,
-    CameraSettings,
     dark_exposures_s,
     frame_times_s,
     longest_exposure_s,
@@ -46,11 +45,10 @@ from .exposure_metering import (
     glow,
     measure_frame,
 )
-from .glow import MeterCharge
+from .glow import MeteredChargeSettings, ladder
 from .patch_names import Patches
 from .random_spacing import PLANNED_SEED, RandomSpacing, Spacing
 from .sample_pose import (
-    charge,
     check_visible,
     face_lamp,
     has_door,
@@ -58,7 +56,6 @@ from .sample_pose import (
     visible_after_s,
 )
 from .sanity_checks import SanityChecks
-from .scenes import Arrangement, Scene, ScenesProtocol
 
 #: Earliest first photograph after lamp off: a halogen lamp has gone dark by then.
 EARLIEST_S = 0.5
@@ -86,7 +83,7 @@ class Plateau(FrozenModel):
     at_most: DurationS = Field(7200.0, gt=0)
 
 
-class DecaySettings(ScenesProtocol):
+class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
     """Settings of a decay; `decay.yaml` is the commented example.
 
     Attributes
@@ -96,10 +93,6 @@ class DecaySettings(ScenesProtocol):
         the glow stops growing.
     plateau
         Criterion by which `charge: plateau` ends.
-    meter
-        Time for which the lamp shines on the sample before the photographs by which exposures are
-        chosen, for example `5 min`. A longer charge must not glow more than twice as bright.
-        Default: as long as `charge`, at most 10 minutes.
     every
         Time between the begins of two photographs, in the mean, for example `5 s`.
     spacing
@@ -112,8 +105,6 @@ class DecaySettings(ScenesProtocol):
         halogen lamp needs about 320 ms to go dark, or as soon after that as the trap door is open.
     repeats
         Number of charges, each with a decay after it.
-    camera
-        Sensitivity and aperture of the camera.
     exposure
         Shutter time of all photographs, for example `1 s`. `auto` meters a short charge first, so
         that nothing clips; `grow` does so and exposes longer along the decay, to keep counts.
@@ -137,13 +128,11 @@ class DecaySettings(ScenesProtocol):
     protocol: Literal["decay"] = "decay"
     charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
     plateau: Plateau = Plateau()
-    meter: MeterCharge = None
     every: DurationS = Field(5.0, gt=0)
     spacing: Spacing = "random"
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
     repeats: Count = Field(1, ge=1)
-    camera: CameraSettings = CameraSettings()
     exposure: Annotated[float | Literal["auto", "grow"], WordOrDuration("auto", "grow")] = "auto"
     grow_at_most: float = Field(16.0, ge=1)
     dark: Literal["frames", "background"] = "frames"
@@ -170,16 +159,16 @@ class DecaySettings(ScenesProtocol):
         """Return a charge with the decay after it, as often as it is repeated."""
         return [DecayUnit(self, f"decay-{number}") for number in range(1, self.repeats + 1)]
 
-    def scenes(self) -> Sequence[Scene]:
+    def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return the decays alone, without dark frames and metering."""
-        return [Scene(unit, Arrangement(), WHY) for unit in self.decays()]
+        return [ConfiguredUnit(unit, BenchConfiguration(), WHY) for unit in self.decays()]
 
     @property
     def first_s(self) -> float:
-        """Time from lamp off to the first photograph in seconds; `suited_to` knows the door."""
+        """Time from lamp off to the first photograph in seconds; `resolved_for` knows the door."""
         return EARLIEST_S if self.first == "auto" else self.first
 
-    def suited_to(self, rig: RigFile) -> Self:
+    def resolved_for(self, rig: RigFile) -> Self:
         """Return the protocol with the first photograph after the rig's trap door is open."""
         if self.first != "auto":
             return self
@@ -191,10 +180,6 @@ class DecaySettings(ScenesProtocol):
     def frame_times_s(self) -> list[float]:
         """Return the even begin of each frame in seconds after lamp off."""
         return frame_times_s(self.first_s, self.every, self.duration)
-
-    def settings(self, exposure_s: float) -> ExposureSettings:
-        """Return the camera settings with that shutter time."""
-        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def longest_exposure_s(self, offers: CameraOffers) -> float:
         """Return the longest offered shutter time that fits between two frames, in seconds."""
@@ -213,21 +198,8 @@ class DecaySettings(ScenesProtocol):
 
     def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Return begin and shutter time of each metering frame; for `grow`, along the decay."""
-        longest_s = self.longest_exposure_s(offers)
-        pause_s = offers.overhead_s + MARGIN_S
-        ladder, at_s = [], self.first_s
-        for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
-            exposure_s = offers.exposure_at_most(longest_s * fraction)
-            ladder.append((at_s, exposure_s))
-            at_s += exposure_s + pause_s
-        if self.exposure == "grow":
-            while at_s < self.duration:
-                for fraction in (1 / 16, 1):
-                    exposure_s = offers.exposure_at_most(longest_s * fraction)
-                    ladder.append((at_s, exposure_s))
-                    at_s += exposure_s + pause_s
-                at_s *= 1.5
-        return ladder
+        until_s = self.duration if self.exposure == "grow" else 0.0
+        return ladder(self.first_s, self.longest_exposure_s(offers), offers, until_s)
 
     def schedule(
         self,
@@ -299,11 +271,6 @@ class DecaySettings(ScenesProtocol):
         metering = [MeteringFrame(*at, expected(*at)) for at in self.meter_ladder(offers)]
         return self.schedule(offers, metering, warn, PLANNED_SEED)
 
-    def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """Return the settings of the shortest metering frames, for a check of clipped frames."""
-        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
-        return [self.settings(exposure_s) for _, exposure_s in ladder]
-
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
         """Return the sanity checks of a unit's frames, compared with those of `metering`."""
         background = self.background if self.dark == "background" else None
@@ -330,10 +297,6 @@ class DecaySettings(ScenesProtocol):
         if self.spacing == "even" or not spacing.free_s(exposure_s):
             return spacing.even_lines(exposure_s)
         return spacing.lines(exposure_s, len(self.frame_times_s()))
-
-    def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Charge for that long, and at least for the lamp's warm-up time."""
-        charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
 
 
 class DecayFrames(StrEnum):
@@ -388,7 +351,7 @@ class DecayUnit:
 
         if isinstance(protocol.exposure, float):
             return protocol.schedule(offers, [], session.warn, seed)
-        return session.choose("exposure", decide, protocol.assumed_schedule(offers, seed))
+        return session.decide("exposure", decide, protocol.assumed_schedule(offers, seed))
 
     def _charge(self, session: Session, exposure_s: float) -> None:
         if isinstance(self.protocol.charge, float):
@@ -402,8 +365,8 @@ class DecayUnit:
             session.run_sequence([*lights_out(session), at(self.protocol.first_s, shoot)])
             face_lamp(session)
             session.perform(LAMP_ON)
-            if session.choose(
-                "plateau reached", lambda: self._reached_plateau(session), worst=False
+            if session.decide(
+                "plateau reached", lambda: self._reached_plateau(session), when_planned=False
             ):
                 session.wait(LAMP_SETTLES_S, "lamp settles, charge topped up")
                 return

@@ -5,10 +5,10 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import LAMP_OFF, LAMP_ON, LEDS_OFF, LedSwitch, Switch
+from labrig.acquire import LAMP_OFF, LAMP_ON, LEDS_OFF, LampSwitch, LedSwitch
 from labrig.foundation.models import FrozenModel
 
-from .scenes import Arrangement, Stage
+from .bench_configuration import BenchConfiguration, Stage
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -61,21 +61,21 @@ class ExcitingLights(FrozenModel):
         tuned = tuple(f"{wavelength_nm:g} nm" for wavelength_nm in self.monochromator)
         return self.filters or self.leds or tuned
 
-    def arrangement(self, name: str, stage: Stage = "sample") -> Arrangement:
-        """Return the arrangement of the bench for one light."""
+    def configuration(self, name: str, stage: Stage = "sample") -> BenchConfiguration:
+        """Return the configuration of the bench for one light."""
         if self.filters:
-            return Arrangement(stage, filter=name)
+            return BenchConfiguration(stage, filter=name)
         if self.monochromator:
             wavelength_nm = self.monochromator[self.names().index(name)]
-            return Arrangement(stage, monochromator_nm=wavelength_nm)
-        return Arrangement(stage)
+            return BenchConfiguration(stage, monochromator_nm=wavelength_nm)
+        return BenchConfiguration(stage)
 
-    def on(self, name: str) -> Switch | LedSwitch:
+    def on(self, name: str) -> LampSwitch | LedSwitch:
         """Return the action that switches the light on."""
         return LedSwitch(name) if self.leds else LAMP_ON
 
     @property
-    def off(self) -> Switch | LedSwitch:
+    def off(self) -> LampSwitch | LedSwitch:
         """Action that switches any of the lights off."""
         return LEDS_OFF if self.leds else LAMP_OFF
 

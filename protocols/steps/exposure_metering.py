@@ -20,6 +20,8 @@ from labrig.reduce import ChannelStats, FrameMeasurement, measure, measure_regio
 #: Fraction of the range between black and white that the brightest frame may fill. The rest is room
 #: for a longer charge, the lamp's drift and the shutter's flicker.
 TARGET = 0.4
+#: Shutter times of a metering's first frames, as fractions of the longest.
+LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
 SEEN_DN = 2.0
 #: Fraction of the range below which the longest exposure is dominated by noise.
 DIM = 0.002

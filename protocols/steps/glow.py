@@ -4,7 +4,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Annotated, Protocol
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -17,12 +17,10 @@ from labrig.record import FrameRole
 from .afterglow import glow
 from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s, longest_exposure_s
 from .darkness import levels, range_dn
-from .exposure_metering import DecayMeter, MeteringFrame, Schedule, measure_frame
+from .exposure_metering import LADDER, DecayMeter, MeteringFrame, Schedule, measure_frame
 from .sample_pose import charge, check_visible, face_camera, face_lamp, has_door, lights_out
 from .sanity_checks import SanityChecks
 
-#: Shutter times of a metering's first frames, as fractions of the longest.
-LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
 #: Shutter times of the further frames, along the decay, as fractions of the longest.
 LATER = (1 / 16, 1)
 
@@ -31,7 +29,92 @@ LATER = (1 / 16, 1)
 MeterCharge = Annotated[DurationS, Field(gt=0)] | None
 
 
-class GlowSettings(ProtocolModel):
+class MeteredSettings(ProtocolModel):
+    """Settings of a protocol that takes dark frames, then meters a glow.
+
+    Attributes
+    ----------
+    camera
+        Sensitivity and aperture of the camera.
+    """
+
+    camera: CameraSettings = CameraSettings()
+
+    @abstractmethod
+    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+        """Return begin after lamp off and shutter time of each metering frame."""
+
+    @abstractmethod
+    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Return the shutter time of each dark frame in seconds."""
+
+    @abstractmethod
+    def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
+        """Return the sanity checks of a unit's frames, compared with those of `metering`."""
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Return the camera settings with that shutter time."""
+        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
+
+    def short_settings(self, session: Session) -> list[ExposureSettings]:
+        """Return the settings of the shortest metering frames, for a check of clipped frames."""
+        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
+        return [self.settings(exposure_s) for _, exposure_s in ladder]
+
+    def charge_sample(self, session: Session, duration_s: float) -> None:
+        """Charge for that long, and at least for the lamp's warm-up time."""
+        charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
+
+
+def ladder(
+    first_s: float,
+    longest_s: float,
+    offers: CameraOffers,
+    until_s: float = 0.0,
+    later: Sequence[float] = LATER,
+) -> list[tuple[float, float]]:
+    """Return begin and shutter time of metering frames, as early one after another as they can be.
+
+    Parameters
+    ----------
+    first_s
+        Begin of the first frame after lamp off in seconds.
+    longest_s
+        Longest shutter time in seconds.
+    offers
+        Exposure settings that the camera offers.
+    until_s
+        Time after lamp off in seconds until which further frames begin, each group of them half as
+        late again as the end of the one before; 0 for the first frames alone.
+    later
+        Shutter times of the further frames, as fractions of the longest.
+    """
+    frames: list[tuple[float, float]] = []
+    at_s, fractions = first_s, LADDER
+    while not frames or at_s < until_s:
+        for fraction in fractions:
+            exposure_s = offers.exposure_at_most(longest_s * fraction)
+            frames.append((at_s, exposure_s))
+            at_s += exposure_s + offers.overhead_s + MARGIN_S
+        at_s, fractions = at_s * 1.5, tuple(later)
+    return frames
+
+
+class MeteredChargeSettings(MeteredSettings):
+    """Settings of a protocol that meters the glow after a charge of its own.
+
+    Attributes
+    ----------
+    meter
+        Time for which the lamp shines on the sample before the photographs by which exposures are
+        chosen, for example `5 min`. A longer charge must not glow more than twice as bright.
+        Default: as long as `charge`, at most 10 minutes.
+    """
+
+    meter: MeterCharge = None
+
+
+class GlowSettings(MeteredChargeSettings):
     """Settings of a protocol that photographs a glow, and the exposures that follow from them.
 
     Attributes
@@ -39,20 +122,12 @@ class GlowSettings(ProtocolModel):
     charge
         Time for which the lamp shines on the sample before each series of photographs, for example
         `10 min`. A strong glow is enough; it need not be saturated.
-    meter
-        Time for which the lamp shines on the sample before the photographs by which exposures are
-        chosen, for example `5 min`. A longer charge must not glow more than twice as bright.
-        Default: as long as `charge`, at most 10 minutes.
     longest
         Longest exposure, for example `30 s`.
-    camera
-        Sensitivity and aperture of the camera.
     """
 
     charge: DurationS = Field(600.0, gt=0)
-    meter: MeterCharge = None
     longest: DurationS = Field(30.0, gt=0)
-    camera: CameraSettings = CameraSettings()
 
     @property
     @abstractmethod
@@ -66,10 +141,6 @@ class GlowSettings(ProtocolModel):
     @abstractmethod
     def regions(self) -> Sequence[Region]:
         """Return the regions of the glow; the brightest decides."""
-
-    def settings(self, exposure_s: float) -> ExposureSettings:
-        """Return the camera settings with that shutter time."""
-        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def longest_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Return the longest shutter time of each frame, which ends before the next begins."""
@@ -86,17 +157,8 @@ class GlowSettings(ProtocolModel):
 
     def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Return begin and shutter time of each metering frame, to the last frame of the glow."""
-        longest_s = max(self.longest_exposures_s(offers))
-        pause_s = offers.overhead_s + MARGIN_S
-        ladder: list[tuple[float, float]] = []
-        at_s, fractions = self.times_s()[0], LADDER
-        while not ladder or at_s < self.times_s()[-1]:
-            for fraction in fractions:
-                exposure_s = offers.exposure_at_most(longest_s * fraction)
-                ladder.append((at_s, exposure_s))
-                at_s += exposure_s + pause_s
-            at_s, fractions = at_s * 1.5, LATER
-        return ladder
+        longest_s, times_s = max(self.longest_exposures_s(offers)), self.times_s()
+        return ladder(times_s[0], longest_s, offers, until_s=times_s[-1])
 
     def schedule(
         self, offers: CameraOffers, measured: Sequence[MeteringFrame], warn: Callable[[str], None]
@@ -112,18 +174,9 @@ class GlowSettings(ProtocolModel):
         """Return the schedule with the longest exposures that `schedule` can return."""
         return Schedule(tuple(self.times_s()), tuple(self.longest_exposures_s(offers)))
 
-    def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """Return the settings of the shortest metering frames, for a check of clipped frames."""
-        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
-        return [self.settings(exposure_s) for _, exposure_s in ladder]
-
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
         """Return the sanity checks of a unit's frames, compared with those of `metering`."""
         return SanityChecks(session, unit, self.regions(), None, self.role, metering)
-
-    def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Charge for that long, and at least for the lamp's warm-up time."""
-        charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
 
 
 def metered_schedule(session: Session, protocol: GlowSettings, metering: str) -> Schedule:
@@ -135,7 +188,7 @@ def metered_schedule(session: Session, protocol: GlowSettings, metering: str) ->
         measured = [measure_frame(frame, protocol.regions()) for frame in frames]
         return protocol.schedule(offers, measured, session.warn)
 
-    return session.choose("exposure", decide, protocol.brightest_schedule(offers))
+    return session.decide("exposure", decide, protocol.brightest_schedule(offers))
 
 
 #: Interval of checks of the sample, and longest rest.
@@ -212,7 +265,9 @@ def _look(
     for fraction in LADDER[::-1]:
         exposure_s = offers.exposure_at_most(longest.exposure_s * fraction)
         session.perform(Shoot(FrameRole.REST, replace(longest, exposure_s=exposure_s)))
-        light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
+        light = session.decide(
+            "light before", lambda: _light(session, unit, regions), when_planned=0.0
+        )
         if np.isfinite(light):
             return light
         least = longest.exposure_s / exposure_s
@@ -237,37 +292,11 @@ def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
 METER_CHARGE_S = 600.0
 
 
-class MeteredProtocol(Protocol):
-    """Interface of a protocol that takes dark frames, then meters a glow."""
-
-    @property
-    def meter(self) -> float | None:
-        """Duration of the charge in seconds; None for as long as later ones, up to a limit."""
-
-    def settings(self, exposure_s: float) -> ExposureSettings:
-        """Return the camera settings with that shutter time."""
-
-    def dark_exposures_s(self, offers: CameraOffers) -> Sequence[float]:
-        """Return the shutter time of each dark frame in seconds."""
-
-    def meter_ladder(self, offers: CameraOffers) -> Sequence[tuple[float, float]]:
-        """Return begin after lamp off and shutter time of each metering frame."""
-
-    def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """Return the settings of the shortest metering frames, for a check of clipped frames."""
-
-    def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Charge for that long, and at least for the lamp's warm-up time."""
-
-    def checks(self, session: Session, unit: str) -> SanityChecks:
-        """Return the sanity checks of a unit's frames."""
-
-
 @dataclass(frozen=True)
 class DarkUnit:
     """Dark frames at the later exposures, before anything glows."""
 
-    protocol: MeteredProtocol
+    protocol: MeteredSettings
     name: str = "dark"
 
     def run(self, session: Session) -> None:
@@ -284,7 +313,7 @@ class DarkUnit:
 class MeterUnit:
     """A shorter charge whose glow determines the exposures."""
 
-    protocol: MeteredProtocol
+    protocol: MeteredChargeSettings
     charge_s: float
     name: str = "meter"
 

@@ -144,7 +144,7 @@ def card_light(session: Session, settings: ExposureSettings, card: Region) -> Ca
         frames = [measure_frame(frame, [card]) for frame in session.frames(FrameRole.METER)]
         return CardLight(_per_s(frames), settings)
 
-    return session.choose("light of the card", decide, CardLight(DIM_PER_S, settings))
+    return session.decide("light of the card", decide, CardLight(DIM_PER_S, settings))
 
 
 def _per_s(frames: Sequence[MeteringFrame]) -> float:

@@ -21,15 +21,16 @@ from labrig.acquire import (
 )
 from labrig.foundation.quantity import Count, DurationS
 
+from .bench_configuration import BenchConfiguration
+from .bracketing import Bracketing
 from .camera_settings import CameraSettings
-from .scenes import Arrangement, Bracketing
 
 #: LEDs of the shipped rig, after the thesis's nine and its ultraviolet lamp.
 LED_NAMES = (
     "365 nm", "405 nm", "430 nm", "455 nm", "490 nm", "530 nm", "565 nm", "590 nm", "625 nm",
 )  # fmt: skip
 #: The bench with the samples, and with the card in their place.
-ON_SAMPLE, ON_CARD = Arrangement(), Arrangement("grey card")
+ON_SAMPLE, ON_CARD = BenchConfiguration(), BenchConfiguration("grey card")
 #: Begin of the names of units, which end with the LED: the card, and the first LED once more.
 CARD, AGAIN = "card ", "again "
 CARD_REASON = "its light under every LED tells how bright the LED is"
@@ -138,7 +139,7 @@ class LitUnit(ABC):
     def measure_dark(self, session: Session) -> None:
         """Photograph what is left with the light off."""
         settings = self.bracketing.settings(
-            session.choose("exposure off", lambda: self._longest_s(session), self._worst_s)
+            session.decide("exposure off", lambda: self._longest_s(session), self._worst_s)
         )
         session.perform(Shoot(self.off_role, settings))
 

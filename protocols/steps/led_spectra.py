@@ -9,7 +9,7 @@ from labrig.foundation.quantity import duration_text
 from labrig.optics import read_spectrometer_reading
 from labrig.record import FrameRole, SpectrumRecord
 
-from .scenes import ENOUGH
+from .bracketing import ENOUGH
 
 #: Integration times of metering, as fractions of the longest.
 LADDER = (1 / 1000, 1 / 100, 1 / 10, 1)
@@ -38,15 +38,15 @@ class SpectrumReadings:
         """Read single spectra, each longer than the one before, until one is bright enough."""
         for integration_s in self._ladder(session):
             session.perform(ReadSpectrum(FrameRole.METER, integration_s, 1))
-            if session.choose(
-                "spectrum bright enough", lambda: self._is_bright(session, unit), worst=False
+            if session.decide(
+                "spectrum bright enough", lambda: self._is_bright(session, unit), when_planned=False
             ):
                 break
 
     def read(self, session: Session, role: str, unit: str) -> None:
         """Read with the integration time that the unit's metering tells."""
         low_s, high_s = self._limits_s(session)
-        chosen_s = session.choose(
+        chosen_s = session.decide(
             "integration", lambda: self._integration_s(session, unit, low_s, high_s), high_s
         )
         session.perform(ReadSpectrum(role, chosen_s, self.repetitions))

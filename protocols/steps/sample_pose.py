@@ -14,10 +14,10 @@ from labrig.acquire import (
     SHIELD,
     SHIELD_COVER,
     SHIELD_UNCOVER,
+    LampSwitch,
     LedSwitch,
     Rig,
     Session,
-    Switch,
     TimedAction,
     at,
 )
@@ -55,14 +55,14 @@ def face_lamp(session: Session) -> None:
         session.wait(max(travels_s) + SETTLES_S, "door and shield move")
 
 
-def charge(session: Session, duration_s: float, on: Switch | LedSwitch = LAMP_ON) -> None:
+def charge(session: Session, duration_s: float, on: LampSwitch | LedSwitch = LAMP_ON) -> None:
     """Turn the sample to the lamp and light it for that long, by default by the lamp."""
     face_lamp(session)
     session.perform(on)
     session.wait(duration_s, "charging")
 
 
-def lights_out(session: Session, off: Switch | LedSwitch = LAMP_OFF) -> Sequence[TimedAction]:
+def lights_out(session: Session, off: LampSwitch | LedSwitch = LAMP_OFF) -> Sequence[TimedAction]:
     """Return the begin of a timed sequence: lamp off, shield before it, then the door opens."""
     steps = [at(0.0, off)]
     if SHIELD in session.rig:

@@ -6,7 +6,7 @@ from itertools import groupby
 
 from labrig.acquire import Session, Unit
 
-from .scenes import Arrangement, Scene
+from .bench_configuration import BenchConfiguration, ConfiguredUnit
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class UnitOfSample:
 
 
 @dataclass(frozen=True)
-class SampleScene:
+class SampleTurn:
     """A scene of one sample.
 
     Attributes
@@ -44,24 +44,26 @@ class SampleScene:
     part
         Name of its part of the chain, the same for all samples.
     scene
-        Scene of the sample.
+        ConfiguredUnit of the sample.
     """
 
     part: str
-    scene: Scene
+    scene: ConfiguredUnit
 
     @property
-    def group(self) -> tuple[str, Arrangement, bool]:
-        """Key of the scenes among which samples may take turns: one part, one arrangement."""
-        return self.part, self.scene.arrangement, self.scene.is_dark
+    def group(self) -> tuple[str, BenchConfiguration, bool]:
+        """Key of the scenes among which samples may take turns: one part, one configuration."""
+        return self.part, self.scene.configuration, self.scene.is_dark
 
 
-def in_sample_turns(scenes: Mapping[str, Sequence[SampleScene]], *, shared: bool) -> list[Scene]:
+def in_sample_turns(
+    scenes: Mapping[str, Sequence[SampleTurn]], *, shared: bool
+) -> list[ConfiguredUnit]:
     """Return the scenes of all samples in the order of measurement.
 
     With shared rests the samples take turns, scene by scene, where scenes of one part in one
-    arrangement begin with a rest; where they do not, sample follows sample, so that a lamp that
-    burns need not be switched off. An arrangement of the bench is made once for all samples.
+    configuration begin with a rest; where they do not, sample follows sample, so that a lamp that
+    burns need not be switched off. An configuration of the bench is made once for all samples.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def in_sample_turns(scenes: Mapping[str, Sequence[SampleScene]], *, shared: bool
     }
     if not shared:
         return [each.scene for of_sample in own.values() for each in of_sample]
-    ordered: list[SampleScene] = []
+    ordered: list[SampleTurn] = []
     rounds = list(zip(*own.values(), strict=True))
     for _, alike in groupby(rounds, key=lambda each: each[0].group):
         of_group = list(alike)
@@ -92,8 +94,8 @@ def in_sample_turns(scenes: Mapping[str, Sequence[SampleScene]], *, shared: bool
     return [each.scene for each in ordered]
 
 
-def _on_changer(sample: str, each: SampleScene) -> SampleScene:
+def _on_changer(sample: str, each: SampleTurn) -> SampleTurn:
     """Return the scene with its sample brought before it, or all taken away from a card."""
     scene = each.scene
-    in_place = sample if scene.arrangement.stage in ("sample", "lit sample") else None
+    in_place = sample if scene.configuration.stage in ("sample", "lit sample") else None
     return replace(each, scene=replace(scene, unit=UnitOfSample(scene.unit, in_place)))

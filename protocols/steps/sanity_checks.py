@@ -83,7 +83,7 @@ class SanityChecks:
             ]
             return darkness(measured, frames[0].iso)
 
-        light = self.session.choose("light before charging", decide, worst=DARK)
+        light = self.session.decide("light before charging", decide, when_planned=DARK)
         if light.is_doubtful:
             light = replace(light, fades=self._closer_look(shorter) is Afterglow.FADING)
         light.require(self.session.warn)
@@ -156,10 +156,10 @@ class SanityChecks:
                 *self._glows([under_lamp_frame, *self._unit_frames(FrameRole.LOOK)])
             )
 
-        compared = self.session.choose("frame to compare with", longest_open, under_lamp[-1])
+        compared = self.session.decide("frame to compare with", longest_open, under_lamp[-1])
         look_again = Shoot(FrameRole.LOOK, compared)
         self.session.run_sequence([at(0.0, LAMP_OFF), at(LAMP_GONE_S, look_again)])
-        if not self.session.choose("lamp has gone out", gone_out, worst=True):
+        if not self.session.decide("lamp has gone out", gone_out, when_planned=True):
             raise DeviceError(
                 "it is as bright after lamp off as before: the lamp still burns although its relay "
                 "reads off (pull its plug, the contact may be welded), or it did not light at all"
@@ -197,7 +197,7 @@ class SanityChecks:
     def _require(
         self, decide: Callable[[], Afterglow], shorter: Sequence[ExposureSettings]
     ) -> None:
-        afterglow = self.session.choose("after lamp off", decide, worst=Afterglow.FADING)
+        afterglow = self.session.decide("after lamp off", decide, when_planned=Afterglow.FADING)
         if afterglow is Afterglow.CLIPPED:
             afterglow = self._closer_look(shorter)
         afterglow.require(self.session.warn)
@@ -212,7 +212,7 @@ class SanityChecks:
         self._shoot(shorter)
         self.session.wait(LOOK_AGAIN_S, "is it a lamp, or does it fade?")
         self._shoot(shorter)
-        return self.session.choose("a closer look", decide, worst=Afterglow.FADING)
+        return self.session.decide("a closer look", decide, when_planned=Afterglow.FADING)
 
     def _shoot(self, settings: Sequence[ExposureSettings]) -> None:
         for exposure in settings:

@@ -13,16 +13,15 @@ from pydantic import Field, model_validator
 from labrig.acquire import ProtocolModel, Unit
 from labrig.foundation.named_files import FilePath, ShippedOrFile
 from labrig.foundation.quantity import Count, DurationS
+from labrig.protocols.steps.bench_configuration import (
+    BenchConfiguration,
+    RestoreBench,
+    WithConfiguration,
+)
+from labrig.protocols.steps.bracketing import Bracketing, StillDarkUnit
 from labrig.protocols.steps.camera_settings import CameraSettings
 from labrig.protocols.steps.led_scenes import CARD, ON_CARD, ON_SAMPLE, LampNames, LampUnit
 from labrig.protocols.steps.patch_names import Patches
-from labrig.protocols.steps.scenes import (
-    Arranged,
-    Arrangement,
-    Bracketing,
-    PutBackUnit,
-    StillDarkUnit,
-)
 
 
 class IlluminantFrames(StrEnum):
@@ -40,7 +39,7 @@ class IlluminantFrames(StrEnum):
 LAMP_NAMES = ("daylight", "halogen", "xenon", "ultraviolet")
 #: Begin of the names of the units of samples and chart, which end with the lamp.
 SAMPLE, CHART = "sample ", "chart "
-ON_CHART = Arrangement("colorchecker")
+ON_CHART = BenchConfiguration("colorchecker")
 
 
 class ValidateIlluminants(ProtocolModel):
@@ -116,12 +115,12 @@ class ValidateIlluminants(ProtocolModel):
         before = ON_CHART if self.chart else ON_CARD
         return [
             StillDarkUnit(self.bracketing),
-            Arranged(cards[0], ON_CARD, ON_SAMPLE, card),
+            WithConfiguration(cards[0], ON_CARD, ON_SAMPLE, card),
             *cards[1:],
-            *([Arranged(self._chart(), ON_CHART, ON_CARD, chart)] if self.chart else []),
-            Arranged(samples[0], ON_SAMPLE, before, sample),
+            *([WithConfiguration(self._chart(), ON_CHART, ON_CARD, chart)] if self.chart else []),
+            WithConfiguration(samples[0], ON_SAMPLE, before, sample),
             *samples[1:],
-            PutBackUnit(ON_SAMPLE),
+            RestoreBench(ON_SAMPLE),
         ]
 
     def _card(self, lamp: str) -> LampUnit:

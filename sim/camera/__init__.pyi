@@ -1,7 +1,6 @@
 from .body_settings import BodySettings as BodySettings
 from .camera import SimulatedCamera as SimulatedCamera
 from .faults import CameraFaults as CameraFaults
-from .pace import Pace as Pace
 from .photograph import Sensor as Sensor
-from .ptpip.server import PtpIpServer as PtpIpServer
+from .ptpip.server import Pace as Pace, PtpIpServer as PtpIpServer
 from .standard.body import StandardHabits as StandardHabits

@@ -9,13 +9,12 @@ from .faults import CameraFaults
 from .objects import StoredObject
 from .operations import Operations
 from .photograph import Sensor
-from .power import AutoPowerOff
 from .responder import Responder
 from .shutter import Shutter
 from .standard.body import StandardBody, StandardHabits
 from .standard.operations import StandardOperations
 from .usb.backend import CameraBackend
-from .usb.cable import Cable
+from .usb.cable import AutoPowerOff, Cable
 from .usb.descriptors import UsbIdentity
 from .usb.still_image import StillImageFunction
 

@@ -8,7 +8,7 @@ RELAY = 3
 RIG = """
 name: half a bench
 devices:
-  lamp: {{driver: numato_relay, address: "{address}", relay: 3}}
+  lamp: {{driver: numato, address: "{address}", relay: 3}}
 """
 
 

@@ -37,7 +37,7 @@ from labrig.protocols.excitation.result import LightScatter, PatchCharging
 from labrig.results import BandTests, ChargingSeries, FittedExcitation, Series
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM
-from labrig.sim.lvf import Lvf
+from labrig.sim.layout import Lvf
 from tests.fit.charged_samples import Bench
 from tests.fit.layers import Layer
 

@@ -75,7 +75,7 @@ def table_mistake(name: str, text: str, needs: str, exit_code: int = 0) -> Mista
 SIM_RIG = """\
 name: mine
 devices:
-  lamp: {driver: numato_relay, address: sim://room/relays, relay: 0}
+  lamp: {driver: numato, address: sim://room/relays, relay: 0}
   camera: {driver: ptp_camera, address: sim://room/camera, shutter_lag: 60 ms}
 optics: {camera: canon_eos_5d_mark_ii}
 simulation: {sample: blue-paint, sensor: {width: 96, height: 64}}
@@ -121,9 +121,7 @@ MISTAKES = (
         "lab time",
         0,
     ),
-    rig_mistake(
-        "a driver misspelt", SIM_RIG.replace("numato_relay", "numato_rely"), "numato_relay"
-    ),
+    rig_mistake("a driver misspelt", SIM_RIG.replace("numato", "numato_rely"), "numato"),
     rig_mistake(
         "a serial port that is not there",
         SIM_RIG.replace("sim://room/relays", "/dev/ttyUSB97"),

@@ -146,7 +146,7 @@ def _room(case: Case, leds: Path | None = None) -> Callable[[dict[str, Any]], No
             sample["material"] = material(name)
         simulation |= {"seed": case.seed, "sensor": {"width": 192, "height": 128}, **case.room}
         if case.blue_nm is not None:
-            lamps = rig["devices"]["illuminants"]["lamps"]
+            lamps = rig["devices"]["illuminants"]["channels"]
             lamps["blue"] = lamps.pop("ultraviolet") | {"centre": case.blue_nm, "fwhm": 20}
             simulation["illuminants"][3] |= {"centre": case.blue_nm + 1.0, "fwhm": 22}
         if leds is not None:

@@ -23,7 +23,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.material import read_material
 from labrig.results import NORMAL_95, Measured, ProfileInterval
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit import truths
 from tests.fit.charged_samples import Bench, lvf_windows

@@ -26,8 +26,8 @@ from labrig.calibration import PatchReflectance
 from labrig.fit.excitation import RelativeSigmas, layer_effect
 from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
-from labrig.protocols.excitation.analysis.density import largest_density
 from labrig.protocols.excitation.analysis.lamp_light import LAMP_SIGMA, LARGEST_FACTOR, scale_sigma
+from labrig.protocols.excitation.analysis.material import largest_density
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.phosphor import phosphor
 from tests.acceptance.excitation_light import (

@@ -56,7 +56,7 @@ def _faults(*faults: Content) -> Callable[[Content, Content], None]:
 
 
 def _swapped(rig: Content, protocol: Content) -> None:
-    leds = rig["devices"]["leds"]["relays"]
+    leds = rig["devices"]["leds"]["channels"]
     leds["455 nm"]["relay"], leds["530 nm"]["relay"] = 3, 2
 
 
@@ -69,7 +69,7 @@ def _too_bright(rig: Content, protocol: Content) -> None:
 def _file_without_a_column(rig: Content, protocol: Content) -> None:
     path = Path(rig["folder"]) / "led.csv"
     path.write_text("wavelength_nm\n400\n500\n")
-    rig["devices"]["leds"]["relays"]["455 nm"] = {"relay": 2, "spectrum": str(path)}
+    rig["devices"]["leds"]["channels"]["455 nm"] = {"relay": 2, "spectrum": str(path)}
 
 
 def _calibration_without_a_key(rig: Content, protocol: Content) -> None:
@@ -200,9 +200,9 @@ def _rig(seed: int) -> Content:
     rig: Content = read_yaml(resources.find("config", "rig", "sim-fluorescent"))
     channels = rig["devices"]["leds"]["channels"]
     rig["devices"]["leds"] = {
-        "driver": "numato_led_bank",
+        "driver": "numato",
         "address": "sim://room/relays",
-        "relays": {
+        "channels": {
             led: {"relay": relay}
             | {key: channels[led][key] for key in ("centre", "fwhm", "settling")}
             for relay, led in enumerate(OUTPUTS, start=1)

@@ -1,4 +1,4 @@
-"""Very many PTP containers that come to harm between driver and camera, over USB and network.
+"""Very many PTP containers that come to harm between driver and camera, over USB.
 
     python -m tests.acceptance.ptp_fuzz [--cases 100000] [--seed 1] [--way NAME [--session N]]
 

@@ -10,8 +10,8 @@ after a straight line through the positions that were found.
 
 import numpy as np
 
-from labrig.fit.least_squares import least_squares
 from labrig.fit.lvf import MERCURY, Line, locate_lines
+from labrig.fit.nonlinear_least_squares import least_squares
 from labrig.optics import read_spectrum
 from tests.fit import strd
 from tests.real_data import REAL, SHARED

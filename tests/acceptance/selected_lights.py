@@ -22,7 +22,7 @@ from labrig.material import read_material
 from labrig.process import process_run
 from labrig.protocols.excitation.result import ExcitationResult
 from labrig.protocols.irradiance.result import IrradianceResult
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.lamp import BURNING_K, filament_spectrum
 from labrig.sim.phosphor import band_cells, phosphor
 from tests.analyse.recorded import record

@@ -25,7 +25,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
-from labrig.protocols.camera_calibration.analysis.bend import Bend, fit_bend
+from labrig.protocols.camera_calibration.analysis.linearity import Bend, fit_bend
 from labrig.protocols.camera_calibration.analysis.photon_transfer import (
     Pair,
     measure_pair,

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import colour
 import numpy as np
 
-from labrig.analyse.strip_model import conditioned_on_white
+from labrig.analyse.forward_model import conditioned_on_white
 from labrig.fit.spectrum import (
     CurveError,
     SpectralSystem,

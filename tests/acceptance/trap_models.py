@@ -35,7 +35,7 @@ from labrig.material import (
 )
 from labrig.process import process_and_report
 from labrig.protocols.excitation.result import ExcitationResult
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.lamp import BURNING_K, Lamp, filament_spectrum
 from labrig.sim.phosphor import band_cells, phosphor
 from labrig.sim.simulation import LampSettings

@@ -450,7 +450,7 @@ FIGURES = (
         figure.went_wrong,
     ),
     Figure(
-        "Damaged PTP containers over USB and network, 10 000 each way: no hang, no traceback",
+        "Damaged PTP containers over USB, 10 000 each way: no hang, no traceback",
         "ptp_fuzz",
         figure.containers,
     ),

@@ -23,7 +23,7 @@ DIM_CHARGE, BRIGHT_CHARGE = 0.01, 0.5
 CALIBRATED_CARD = {"card": [0.2, 0.1, 0.7, 0.8], "black": [0.02, 0.4, 0.12, 0.2]}
 
 
-THERMOMETER = {"driver": "numato_thermometer", "address": "sim://room/relays", "input": 0}
+THERMOMETER = {"driver": "numato", "address": "sim://room/relays", "input": 0}
 
 
 #: Materials that fade within seconds, of which frames are taken closer together.

@@ -46,8 +46,10 @@ class NotingLamp:
         self._note("lamp gone")
 
 
-class _NotingSwing:
+class NotingSwing:
     """Something that swings between two ends; each command takes its time, or fails on demand."""
+
+    ends: tuple[str, str]
 
     def __init__(self, clock: VirtualClock, note: Note) -> None:
         self.takes_s = 0.005
@@ -64,37 +66,26 @@ class _NotingSwing:
     def disconnect(self) -> None:
         self._note("swing gone")
 
-    def _go(self, where: str) -> None:
+    def swing(self, *, safe: bool) -> None:
         self._clock.sleep(self.takes_s)
         if self.fail:
             raise self.fail
-        self._note(where)
+        self._note(self.ends[safe])
+
+    def make_safe(self) -> None:
+        self.swing(safe=True)
 
 
-class NotingDoor(_NotingSwing):
+class NotingDoor(NotingSwing):
     """A trap door."""
 
-    def open(self) -> None:
-        self._go("door open")
-
-    def close(self) -> None:
-        self._go("door closed")
-
-    def make_safe(self) -> None:
-        self.close()
+    ends = ("door open", "door closed")
 
 
-class NotingShield(_NotingSwing):
+class NotingShield(NotingSwing):
     """A shield before the lamp."""
 
-    def cover(self) -> None:
-        self._go("shield covered")
-
-    def uncover(self) -> None:
-        self._go("shield uncovered")
-
-    def make_safe(self) -> None:
-        self.uncover()
+    ends = ("shield covered", "shield uncovered")
 
 
 class NotingCamera:

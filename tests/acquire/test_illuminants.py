@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from labrig.acquire import (
+    ILLUMINANTS,
     ILLUMINANTS_OFF,
     Illuminant,
     IlluminantSwitch,
     ProtocolModel,
     Session,
     Unit,
-    illuminant_lights,
+    bank_lights,
     lights_that_read_back,
     plan,
     read_rig_file,
@@ -48,7 +49,7 @@ def rig(make_rig: Make) -> Path:
         {"relay": relay, "kind": kind} for relay, kind in kinds.items()
     ]
     content["devices"]["illuminants"] = {
-        "driver": "numato_lamp_bank", "address": "sim://room/lamps", "lamps": LAMPS,
+        "driver": "numato", "address": "sim://room/lamps", "channels": LAMPS,
     }  # fmt: skip
     path.write_text(write_quickly(content))
     return path
@@ -92,21 +93,21 @@ def test_a_lamp_that_is_not_there_and_another_driver_are_named(rig: Path) -> Non
     with pytest.raises(ProtocolError, match="a lamp 'dya', which the rig has not; did you mean"):
         plan(Lit(protocol="lit", lamps=("dya",)), read_rig_file(rig), str(rig))
     rig.write_text(
-        rig.read_text(encoding="utf-8").replace("numato_lamp_bank", "numato_relay"),
+        rig.read_text(encoding="utf-8").replace("numato", "maestro"),
         encoding="utf-8",
     )
-    with pytest.raises(UsageError, match="'numato_relay' is no bank of lamps"):
+    with pytest.raises(UsageError, match="'maestro' is no bank of lamps"):
         plan(Lit(protocol="lit"), read_rig_file(rig), str(rig))
 
 
 @pytest.mark.parametrize(
     ("key", "driver", "keys", "said"),
     [
-        ("illuminants", "numato_led_bank", {"relays": {"day": 0}}, "is no bank of lamps"),
-        ("leds", "numato_lamp_bank", {"lamps": LAMPS}, "is no bank of LEDs"),
+        ("illuminants", "maestro", {"channels": {"day": 0}}, "is no bank of lamps"),
+        ("leds", "thorlabs_fw102c", {"channels": LAMPS}, "is no bank of LEDs"),
     ],
 )
-def test_a_bank_of_the_other_kind_is_refused(
+def test_a_board_without_switches_is_refused(
     rig: Path, key: str, driver: str, keys: dict[str, Any], said: str
 ) -> None:
     content = read_quickly(rig.read_text(encoding="utf-8"))
@@ -129,7 +130,7 @@ def test_a_bank_of_the_other_kind_is_refused(
 def test_bad_keys_of_a_bank_are_one_clear_line(rig: Path, lamps: object, said: str) -> None:
     content = read_quickly(rig.read_text(encoding="utf-8"))
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
-    content["devices"]["illuminants"]["lamps"] = lamps
+    content["devices"]["illuminants"]["channels"] = lamps
     rig.write_text(write_quickly(content), encoding="utf-8")
     with pytest.raises(UsageError, match=said) as caught:
         plan(Lit(protocol="lit", lamps=("a",)), read_rig_file(rig), str(rig))
@@ -138,7 +139,7 @@ def test_bad_keys_of_a_bank_are_one_clear_line(rig: Path, lamps: object, said: s
 
 def test_the_light_is_that_of_file_illuminant_or_band_behind_its_filter(rig: Path) -> None:
     file = read_rig_file(rig)
-    assert set(illuminant_lights(file, str(rig))) == set(LAMPS)
+    assert set(bank_lights(file, ILLUMINANTS.key, str(rig))) == set(LAMPS)
     lights = illuminant_exposures(file, str(rig))
     nm = [450.0, 600.0]
     np.testing.assert_allclose(lights["day"].light.at(nm), read_light("D65").at(nm))
@@ -154,7 +155,7 @@ def test_the_light_is_that_of_file_illuminant_or_band_behind_its_filter(rig: Pat
 def test_nothing_known_of_a_lamp_and_no_bank_are_one_clear_line(rig: Path, make_rig: Make) -> None:
     content = read_quickly(rig.read_text(encoding="utf-8"))
     content["simulation"]["epoch"] = "2026-01-01T00:00:00Z"
-    content["devices"]["illuminants"]["lamps"] = {"dim": {"relay": 1}}
+    content["devices"]["illuminants"]["channels"] = {"dim": {"relay": 1}}
     rig.write_text(write_quickly(content), encoding="utf-8")
     with pytest.raises(UsageError, match="nothing is known of the light of lamp 'dim'"):
         illuminant_exposures(read_rig_file(rig), str(rig))

@@ -21,7 +21,7 @@ from labrig.acquire import (
     Session,
     Unit,
     at,
-    led_lights,
+    bank_lights,
     lights_that_read_back,
     plan,
     planned_rig,
@@ -53,7 +53,7 @@ def rig(make_rig: Make) -> Path:
     content = read_quickly(path.read_text())
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     content["devices"]["leds"] = {
-        "driver": "numato_led_bank", "address": "sim://room/relays", "relays": BANK,
+        "driver": "numato", "address": "sim://room/relays", "channels": BANK,
     }  # fmt: skip
     path.write_text(write_quickly(content))
     return path
@@ -120,9 +120,10 @@ def test_a_rig_without_them_is_reported_so(make_rig: Make) -> None:
 
 
 def test_another_driver_does_not_do(rig: Path) -> None:
-    text = rig.read_text(encoding="utf-8").replace("numato_led_bank", "numato_relay")
-    rig.write_text(text, encoding="utf-8")
-    with pytest.raises(UsageError, match="'numato_relay' is no bank of LEDs"):
+    content = read_quickly(rig.read_text(encoding="utf-8"))
+    content["devices"]["leds"]["driver"] = "maestro"
+    rig.write_text(write_quickly(content), encoding="utf-8")
+    with pytest.raises(UsageError, match="'maestro' is no bank of LEDs"):
         plan(Colours(protocol="colours"), read_rig_file(rig), str(rig))
 
 
@@ -209,6 +210,32 @@ def test_a_bank_over_two_units_lights_the_room(make_rig: Make) -> None:
     assert peaks_nm == pytest.approx([400, 450, 500, 550, 600], abs=2.5)
 
 
+@pytest.mark.parametrize("answers", ["nothing", "text", "bytes"])
+def test_eight_relays_of_an_lcus_board_light_the_room(make_rig: Make, answers: str) -> None:
+    path = make_rig(
+        leds=[{"relay": 1 + n, "centre": 400 + 30 * n, "fwhm": 20} for n in range(8)],
+        led_board="lcus",
+        lcus=answers,
+    )
+    content = read_quickly(path.read_text())
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"leds": [5]}}
+    channels = {f"{400 + 30 * n} nm": n + 1 for n in range(8)}
+    content["devices"]["leds"] = {
+        "driver": "lcus", "address": "sim://room/lcus", "channels": channels,
+    }  # fmt: skip
+    path.write_text(write_quickly(content))
+    with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+        assert bench.room is not None
+        assert lights_that_read_back(devices)["leds"] == (answers != "nothing")
+        for name in channels:
+            devices[LEDS].light(name)
+            assert devices[LEDS].channel_on() == name
+        devices[LEDS].dark()
+        states = [lit for _, lit in bench.room.room.leds.states]
+    lit_in_turn = [lit for number in range(1, 9) for lit in ({number}, set())]
+    assert states == [set(), {5}, set(), *lit_in_turn]
+
+
 def test_the_rig_check_lists_heads_and_settling(
     make_rig: Make, labrig: Callable[..., Ended]
 ) -> None:
@@ -229,8 +256,8 @@ def test_all_addresses_of_a_bank_are_known(make_rig: Make) -> None:
 
 
 BANKS: dict[str, dict[str, Any]] = {
-    "numato_led_bank": {"relays": {"a": {"relay": 1}, "b": 2}},
-    "serial_led_bank": {
+    "numato": {"channels": {"a": {"relay": 1}, "b": 2}},
+    "serial_relay": {
         "channels": {"a": {"on": "on 1", "off": "off 1"}, "b": {"on": "on 2", "off": "off 2"}}
     },
     "thorlabs_dc4100": {"channels": {"a": {"output": 1}, "b": {"output": 2}}},
@@ -250,7 +277,7 @@ def test_every_bank_says_what_is_known_of_its_light(driver: str, tmp_path: Path)
     leds["a"] |= light
     path = tmp_path / "rig.yaml"
     path.write_text(write_quickly(content))
-    lights = led_lights(read_rig_file(path), str(path))
+    lights = bank_lights(read_rig_file(path), LEDS.key, str(path))
     assert [led.settling for led in lights.values()] == [0.5, 0.0]
     assert lights["a"].peak_nm() == 447
     assert lights["b"].relative_spectrum() is None
@@ -262,11 +289,11 @@ def test_every_bank_says_what_is_known_of_its_light(driver: str, tmp_path: Path)
     leds["a"] |= {"centre": 450, "fwhm": 20}
     path.write_text(write_quickly(content))
     with pytest.raises(UsageError, match="expected 'spectrum', or 'centre' and 'fwhm'"):
-        led_lights(read_rig_file(path), str(path))
+        bank_lights(read_rig_file(path), LEDS.key, str(path))
 
 
 def test_a_rig_without_leds_has_no_light_of_them(make_rig: Make) -> None:
-    assert led_lights(read_rig_file(make_rig()), "rig.yaml") == {}
+    assert bank_lights(read_rig_file(make_rig()), LEDS.key, "rig.yaml") == {}
 
 
 def test_a_band_has_its_width() -> None:

@@ -26,7 +26,7 @@ class NotingChanger:
     def identity(self) -> str:
         return "noting changer"
 
-    def samples(self) -> tuple[str, ...]:
+    def names(self) -> tuple[str, ...]:
         return "a", "b"
 
     def keeps_dark(self) -> bool:

@@ -15,7 +15,7 @@ from labrig.acquire import (
     Rig,
     Session,
     Shoot,
-    TrapDoor,
+    Swing,
     at,
     run_units,
 )
@@ -141,7 +141,7 @@ def test_a_door_that_fails_does_not_keep_the_rest_from_being_safe() -> None:
         bench.rig.make_safe()
     assert refusal.value.unsafe == ("door",)
     assert bench.notes == ["lamp off", "shield uncovered", "camera safe"]
-    assert isinstance(bench.door, TrapDoor)
+    assert isinstance(bench.door, Swing)
 
 
 class TwoFrames:

@@ -54,7 +54,7 @@ def make(make_rig: Make) -> Make:
         relays = {name: {"relay": n, "settling": "0.5 s"} for n, name in enumerate(NAMES, start=1)}
         content["devices"] |= {
             "leds": {
-                "driver": "numato_led_bank", "address": "sim://room/relays", "relays": relays,
+                "driver": "numato", "address": "sim://room/relays", "channels": relays,
             },
             "spectrometer": {
                 "driver": "seabreeze_spectrometer", "address": "sim://room/spectrometer",

@@ -40,7 +40,7 @@ def bench(folder: Path, seed: int = 1, **simulation: Any) -> dict[str, Any]:
     content["simulation"] |= {"seed": seed} | simulation
     del content["devices"]["camera"]
     content["devices"]["lamp"] = {
-        "driver": "numato_relay", "address": "sim://room/relays", "relay": 0, "warm_up": "15 min",
+        "driver": "numato", "address": "sim://room/relays", "relay": 0, "warm_up": "15 min",
     }  # fmt: skip
     detector = Detector(np.random.default_rng([seed, PIXEL_STREAM]))
     _write_curve(folder / "scale.csv", detector.wavelength_nm, detector.irradiance_per_count_rate())

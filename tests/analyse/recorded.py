@@ -12,7 +12,7 @@ from typing import Any
 from filelock import FileLock
 
 from labrig.acquire import Plan, RunObserver
-from labrig.analyse import Inputs, Overrides, Part
+from labrig.analyse import AnalysisContext, Inputs, Overrides
 from labrig.analyse.overrides import read_run_protocol
 from labrig.bench import Recording, Watch, resume_run
 from labrig.foundation import resources
@@ -144,15 +144,15 @@ def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:
     return cut, read_run(run)
 
 
-def part_of(run: Path, inputs: Inputs | None = None) -> Part:
+def part_of(run: Path, inputs: Inputs | None = None) -> AnalysisContext:
     """A whole run as what an analysis is given; with the calibrations of its rig unless told."""
     overrides = Overrides()
     rig = overrides.bench(run)
     inputs = Inputs.of(rig) if inputs is None else inputs
-    return Part(read_run(run), read_run_protocol(run), rig, overrides, inputs)
+    return AnalysisContext(read_run(run), read_run_protocol(run), rig, overrides, inputs)
 
 
-def source_of(part: Part) -> Source:
+def source_of(context: AnalysisContext) -> Source:
     """What a report needs to show the result of `part`."""
-    about = describe_run(part.run, part.protocol, part.rig)
-    return Source(part.run, part.protocol, part.rig, about)
+    about = describe_run(context.run, context.protocol, context.rig)
+    return Source(context.run, context.protocol, context.rig, about)

@@ -13,10 +13,9 @@ import numpy as np
 from labrig.calibration import IrradianceFile
 from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
-from labrig.sim.filters import Filters
+from labrig.sim.filters import Filters, passed_by
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.leds import led_spectrum
-from labrig.sim.monochromator import passed_by
 from labrig.sim.phosphor import band_cells
 from labrig.sim.simulation import Simulation
 from tests.analyse.recorded import record

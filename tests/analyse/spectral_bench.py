@@ -17,7 +17,7 @@ from labrig.optics.piecewise import band_means, edges_from_centres
 from labrig.results.emission_spectrum import WAVELENGTH_NM
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
-from labrig.sim.lvf import PIECES, Lvf, pieces
+from labrig.sim.layout import PIECES, Lvf, pieces
 from labrig.sim.optics import emission
 from tests.analyse.recorded import recorded, shipped_rig
 from tests.quick_yaml import read_quickly, write_quickly

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Inputs, Part
+from labrig.analyse import AnalysisContext, Inputs
 from labrig.foundation.errors import DataError, UsageError
 from labrig.process import process_and_report
 from labrig.protocols.angular_fluorescence.analysis import analyse
@@ -22,7 +22,7 @@ from tests.results.made import assert_read_back
 
 
 #: Few views, of angles far apart.
-def yarn(folder: Path, keys: dict[str, Any] | None = None, **simulation: Any) -> Part:
+def yarn(folder: Path, keys: dict[str, Any] | None = None, **simulation: Any) -> AnalysisContext:
     return part_of(record_angular(folder, ANGULAR | (keys or {}), **simulation))
 
 
@@ -35,7 +35,7 @@ def planted(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def both(tmp_path_factory: pytest.TempPathFactory) -> Part:
+def both(tmp_path_factory: pytest.TempPathFactory) -> AnalysisContext:
     """A run with both directions, each with three placings."""
     keys = {"directions": ["vertical", "horizontal"], "repositionings": 3, "angles": [30, 60, 90]}
     return yarn(tmp_path_factory.mktemp("both"), keys)
@@ -99,7 +99,7 @@ def test_without_curves_channels_have_to_be_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.campaign
-def test_views_that_are_missing_are_named_and_the_others_used(both: Part) -> None:
+def test_views_that_are_missing_are_named_and_the_others_used(both: AnalysisContext) -> None:
     part, attempts = both, both.run.attempts
 
     def without(*units: str) -> list[Attempt]:
@@ -121,10 +121,10 @@ def test_views_that_are_missing_are_named_and_the_others_used(both: Part) -> Non
         analyse(replace(part, run=replace(part.run, attempts=[])))
 
 
-def swapped(part: Part, unit: str, **roles: str) -> Part:
+def swapped(context: AnalysisContext, unit: str, **roles: str) -> AnalysisContext:
     """The part with the frames of one view given other roles."""
     attempts = []
-    for attempt in part.run.attempts:
+    for attempt in context.run.attempts:
         if attempt.unit == unit:
             frames = [
                 replace(frame, role=roles.get(frame.role.replace("-", "_"), frame.role))
@@ -132,7 +132,7 @@ def swapped(part: Part, unit: str, **roles: str) -> Part:
             ]
             attempt = replace(attempt, frames=frames)
         attempts.append(attempt)
-    return replace(part, run=replace(part.run, attempts=attempts))
+    return replace(context, run=replace(context.run, attempts=attempts))
 
 
 def test_an_led_that_does_not_light_in_one_view_is_noticed(planted: Path) -> None:
@@ -159,16 +159,16 @@ def test_a_clipped_view_is_left_out(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def sphere(tmp_path_factory: pytest.TempPathFactory) -> Part:
+def sphere(tmp_path_factory: pytest.TempPathFactory) -> AnalysisContext:
     """A run with a sphere of 90 px about (180, 120) in a frame of 360 × 240."""
     folder = tmp_path_factory.mktemp("sphere")
     run = record_sphere(folder, {"reflected_led": "625 nm"}, repositioning=0.01)
     return part_of(run, Inputs({"camera": true_camera(run)}))
 
 
-def changed(part: Part, **keys: Any) -> Part:
+def changed(context: AnalysisContext, **keys: Any) -> AnalysisContext:
     """The part with other settings of its protocol."""
-    return replace(part, protocol=part.protocol.model_copy(update=keys))
+    return replace(context, protocol=context.protocol.model_copy(update=keys))
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def changed(part: Part, **keys: Any) -> Part:
     ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
 )
 def test_a_region_that_cuts_the_outline_is_named_and_no_dependence(
-    sphere: Part, region: tuple[int, ...], sides: dict[str, int]
+    sphere: AnalysisContext, region: tuple[int, ...], sides: dict[str, int]
 ) -> None:
     result = analyse(changed(sphere, region=region))
     reradiated, _ = result.spheres
@@ -196,12 +196,12 @@ def test_a_region_that_cuts_the_outline_is_named_and_no_dependence(
     assert 0.007 < reradiated.shading.by_view.amplitude.sigma < 0.02
 
 
-def test_an_outline_of_which_too_little_is_left_is_refused(sphere: Part) -> None:
+def test_an_outline_of_which_too_little_is_left_is_refused(sphere: AnalysisContext) -> None:
     with pytest.raises(DataError, match=r"in \d+ of 61 directions: the region cuts it off"):
         analyse(changed(sphere, region=(120, 22, 158, 196)))
 
 
-def test_a_given_circle_that_is_off_is_named_and_refined(sphere: Part) -> None:
+def test_a_given_circle_that_is_off_is_named_and_refined(sphere: AnalysisContext) -> None:
     across, down, wider = -2, 0, -2
     circle = Circle(
         centre=((180 + across) / 360, (120 + down) / 240), radius=(90 + wider) / 360
@@ -212,7 +212,9 @@ def test_a_given_circle_that_is_off_is_named_and_refined(sphere: Part) -> None:
     assert result.detectable < 0.07
 
 
-def test_a_given_circle_of_another_outline_counts_with_the_difference(sphere: Part) -> None:
+def test_a_given_circle_of_another_outline_counts_with_the_difference(
+    sphere: AnalysisContext,
+) -> None:
     result = analyse(changed(sphere, circle=Circle(centre=(0.5, 0.5), radius=85 / 360)))
     assert not result.finds_dependence
     assert result.spheres[0].circles == pytest.approx(np.array([[180.0, 120.0, 85.0]] * 4))
@@ -220,7 +222,9 @@ def test_a_given_circle_of_another_outline_counts_with_the_difference(sphere: Pa
     assert 0.2 < result.detectable < 1.0
 
 
-def test_a_sphere_is_lambertian_in_re_radiation_and_not_in_reflection(sphere: Part) -> None:
+def test_a_sphere_is_lambertian_in_re_radiation_and_not_in_reflection(
+    sphere: AnalysisContext,
+) -> None:
     result = analyse(sphere)
     reradiated, reflected = result.spheres
     assert not result.finds_dependence

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part
+from labrig.analyse import AnalysisContext
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.material import read_reradiation
@@ -142,11 +142,11 @@ def lit(attempt: Attempt) -> SpectrumRecord:
     return [one for one in attempt.spectra if one.role == DirectSpectra.LIT][-1]
 
 
-def changed(part: Part, change: dict[str, Any]) -> Part:
+def changed(context: AnalysisContext, change: dict[str, Any]) -> AnalysisContext:
     """A part some of whose units have other readings: by unit, the factor and the unit of more."""
-    attempts = {attempt.unit: attempt for attempt in part.run.attempts}
+    attempts = {attempt.unit: attempt for attempt in context.run.attempts}
     readings: dict[str, SpectrometerReading] = {}
-    folder = part.run.folder / "frames"
+    folder = context.run.folder / "frames"
     for unit, (factor, more) in change.items():
         spectrum = lit(attempts[unit])
         reading = read_spectrometer_reading(spectrum.path)
@@ -163,7 +163,7 @@ def changed(part: Part, change: dict[str, Any]) -> Part:
             counts = counts + part_of_it * (added.raw_counts - dark.raw_counts.mean(axis=0))
         readings[unit] = replace(reading, raw_counts=np.rint(counts))
     new = []
-    for attempt in part.run.attempts:
+    for attempt in context.run.attempts:
         if attempt.unit not in readings:
             new.append(attempt)
             continue
@@ -174,7 +174,7 @@ def changed(part: Part, change: dict[str, Any]) -> Part:
         made = replace(old, path=path, **_checks(data))
         spectra = [made if one is old else one for one in attempt.spectra]
         new.append(replace(attempt, spectra=spectra))
-    return replace(part, run=replace(part.run, attempts=new))
+    return replace(context, run=replace(context.run, attempts=new))
 
 
 def _checks(data: bytes) -> dict[str, Any]:

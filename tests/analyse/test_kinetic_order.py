@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labrig.material import dark_concentration
-from labrig.protocols.saturation.analysis.kinetic_order import compare_levels
+from labrig.protocols.saturation.analysis import compare_levels
 from labrig.protocols.saturation.result import Curve, OrderTest
 from tests.pulls import assert_sigma_is_right
 

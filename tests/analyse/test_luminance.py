@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part, evaluate_luminance_table
+from labrig.analyse import AnalysisContext, evaluate_luminance_table
 from labrig.bench_optics import card_radiance, luminance
 from labrig.process import process_and_report
 from labrig.protocols.luminance.analysis import analyse
@@ -36,13 +36,15 @@ def long_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(folder, QUICK | keys, sample=[{"material": str(glow), "region": EVERYWHERE}])
 
 
-def changed(part: Part, reading: dict[str, Any] | None = None, **optics: Any) -> Part:
+def changed(
+    context: AnalysisContext, reading: dict[str, Any] | None = None, **optics: Any
+) -> AnalysisContext:
     """The part on a rig whose optics, and whose meter's reading, are others."""
-    old = part.rig.optics
+    old = context.rig.optics
     assert old.luminance is not None
     own = type(old.luminance).model_validate(old.luminance.model_dump() | (reading or {}))
     new = old.model_copy(update={"luminance": own, **optics})
-    return replace(part, rig=part.rig.model_copy(update={"optics": new}))
+    return replace(context, rig=context.rig.model_copy(update={"optics": new}))
 
 
 def sigma_of(factors: tuple[ScaleFactor, ...], begin: str) -> float:

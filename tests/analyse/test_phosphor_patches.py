@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Overrides
-from labrig.analyse.inputs import Inputs, Part
+from labrig.analyse.inputs import AnalysisContext, Inputs
 from labrig.analyse.strip import StripPatch, for_each_patch, slice_strip, tilt_offset
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.compare.run import read_patches
@@ -152,7 +152,7 @@ def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
     part, rig = parts_of(run / "protocol.yaml")[0], read_rig_file(run / "rig.yaml")
     short = Overrides.parse(["orange-paint=0.03,0.5,0.5,0.4"], [])
     own = read_run(run).part(part.name)
-    found = analyse_spectra(Part(own, part.protocol, rig, short, Inputs.of(rig)))
+    found = analyse_spectra(AnalysisContext(own, part.protocol, rig, short, Inputs.of(rig)))
     (said,) = (line for line in found.warnings if "expected patch orange-paint below" in line)
     assert "columns 12 to 180" in said
     assert "labrig process RUN --roi orange-paint=x,y,width,height" in said

@@ -131,9 +131,9 @@ def test_how_long_it_was_in_the_dark_is_recorded(run: Path) -> None:
 
 def test_the_lamp_is_warm_from_the_turn_of_the_other_sample(run: Path) -> None:
     record, constant_s = read_run(run), 150.0
-    own, beside = record.part(f"{GREEN}/excitation"), record.beside(f"{GREEN}/excitation")
+    own, others = record.part(f"{GREEN}/excitation"), record.without_part(f"{GREEN}/excitation")
     alone, together = (
-        charge_frames(own, Overrides(), constant_s, None, also) for also in (None, beside)
+        charge_frames(own, Overrides(), constant_s, None, also) for also in (None, others)
     )
     assert [one.unit for one in alone.intervals] == [one.unit for one in together.intervals]
     last = together.intervals[-1]

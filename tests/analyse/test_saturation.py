@@ -11,11 +11,17 @@ from labrig.acquire import read_rig_file
 from labrig.analyse.series_fit import fit_series
 from labrig.bench import open_bench
 from labrig.foundation.errors import DataError
-from labrig.protocols.saturation.analysis import analyse, charge_level, charged, compare_rates
-from labrig.protocols.saturation.analysis.kinetic_order import compare_levels
+from labrig.process import process_and_report
+from labrig.protocols.saturation.analysis import (
+    analyse,
+    charge_level,
+    charged,
+    compare_levels,
+    compare_rates,
+)
 from labrig.protocols.saturation.result import Curve, PatchSaturation, SaturationResult
 from labrig.results import Measured, Series
-from tests.analyse.recorded import part_of, processed_once
+from tests.analyse.recorded import part_of
 from tests.analyse.small_runs import HALF, SATURATION
 from tests.analyse.spectral_bench import record
 from tests.results.made import assert_read_back
@@ -37,7 +43,7 @@ def true_level(rig: Path, charge_s: float) -> float:
 
 
 def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
-    done = processed_once(record(tmp_path, SATURATION | HALF, seed=2))
+    done = process_and_report(record(tmp_path, SATURATION | HALF, seed=2))
     assert isinstance(done.result, SaturationResult)
     (patch,) = done.result.patches.values()
     assert patch.time_saturation == "saturated in time"

@@ -20,7 +20,7 @@ from tests.terminal import on_a_terminal
 RIG = """
 name: half a bench
 devices:
-  lamp: {{driver: numato_relay, address: "{address}", relay: 3}}
+  lamp: {{driver: numato, address: "{address}", relay: 3}}
 """
 PATIENCE_S = 60.0
 

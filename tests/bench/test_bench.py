@@ -17,7 +17,7 @@ from tests.terminal import idle_guard, on_a_terminal
 RIG = """
 name: half a bench
 devices:
-  lamp: {{driver: numato_relay, address: "{address}", relay: 3}}
+  lamp: {{driver: numato, address: "{address}", relay: 3}}
 """
 
 
@@ -121,7 +121,7 @@ def test_two_names_of_one_board_are_one_port(
     link = tmp_path / "by-id"
     link.symlink_to(address)
     path = rig(address)
-    thermometer = f"  thermometer: {{driver: numato_thermometer, address: '{link}'}}\n"
+    thermometer = f"  thermometer: {{driver: numato, address: '{link}'}}\n"
     path.write_text(path.read_text() + thermometer)
     with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
         assert set(devices.identities()) == {"lamp", "thermometer"}
@@ -168,7 +168,7 @@ def test_what_is_no_usb_address(tmp_path: Path, address: str) -> None:
 def test_a_driver_in_the_wrong_role(tmp_path: Path, wired: tuple[str, HearingBoard]) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(
-        f"name: x\ndevices:\n  camera: {{driver: numato_relay, address: '{wired[0]}', relay: 1}}\n"
+        f"name: x\ndevices:\n  camera: {{driver: numato, address: '{wired[0]}', relay: 1}}\n"
     )
     with (
         open_bench(read_rig_file(path), str(path)) as bench,

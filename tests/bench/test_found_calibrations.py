@@ -357,7 +357,7 @@ def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) ->
         (folder / f"{name}.yaml").write_text("read later")
     rig = read_rig_file(shipped)
     found = find_calibrations(rig, [tmp_path], MADE.timestamp()).rig
-    chain = read_protocol(protocol).suited_to(found)
+    chain = read_protocol(protocol).resolved_for(found)
     assert isinstance(chain, Phosphor)
     assert [part["protocol"] for part in chain.parts] == [
         "calibration_check", "emission_spectrum", "decay", "excitation"
@@ -366,9 +366,9 @@ def test_a_phosphor_on_a_calibrated_bench_is_the_sample_alone(tmp_path: Path) ->
     assert units[:2] == ["calibration_check/card", "emission_spectrum/white"]
     assert units[-2:] == ["decay/meter", "decay/decay-1"]
     REFERENCE_KIND.write(folder, reference(None))
-    without_check = read_protocol(protocol).suited_to(found)
+    without_check = read_protocol(protocol).resolved_for(found)
     assert next(unit.name for unit in without_check.units()) == "emission_spectrum/dark"
-    always = read_protocol(protocol, {"calibrate": "always"}).suited_to(found)
+    always = read_protocol(protocol, {"calibrate": "always"}).resolved_for(found)
     assert isinstance(always, Phosphor)
     assert len(always.parts) == 8
 
@@ -398,7 +398,7 @@ def test_without_a_calibration_there_is_nothing_to_check(rig: RigFile, tmp_path:
     path = tmp_path / "check.yaml"
     path.write_text(write_quickly(CHECK))
     with pytest.raises(UsageError, match="expected a calibration to check, found none"):
-        read_protocol(path).suited_to(rig)
+        read_protocol(path).resolved_for(rig)
 
 
 def test_only_a_calibration_is_kept(tmp_path: Path) -> None:

@@ -24,9 +24,7 @@ from tests.lit_bench import RELAY, BoardProcess, lit_bench
 from tests.terminal import idle_guard
 
 OFF_WITHIN_S = 20.0
-RIG = (
-    "name: lamp\ndevices:\n  lamp: {{driver: numato_relay, address: '{address}', relay: {relay}}}\n"
-)
+RIG = "name: lamp\ndevices:\n  lamp: {{driver: numato, address: '{address}', relay: {relay}}}\n"
 
 #: The Numato board by the driver that knows no board.
 COMMANDS_RIG = r"""
@@ -193,7 +191,7 @@ def test_lamp_and_leds_of_one_board_are_all_switched_off(
 ) -> None:
     """Each is opened by itself; they wait for one another's port."""
     path = rig(board.address)
-    bank = f"{{driver: numato_led_bank, address: '{board.address}', relays: {{a: {RELAY}, b: 6}}}}"
+    bank = f"{{driver: numato, address: '{board.address}', channels: {{a: {RELAY}, b: 6}}}}"
     path.write_text(path.read_text().replace(f"relay: {RELAY}", "relay: 5") + f"  leds: {bank}\n")
     with serial.Serial(board.address) as port:
         port.write(f"relay on {RELAY}\r".encode())

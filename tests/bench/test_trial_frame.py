@@ -8,7 +8,7 @@ import pytest
 
 from labrig.acquire import CAMERA, read_rig_file
 from labrig.bench import open_bench
-from labrig.bench.trial_frame import offers_with_frame_size
+from labrig.bench.execution import offers_with_frame_size
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.yaml_file import read_yaml
 from labrig.record import read_run

@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import curve_fit
 
 from labrig.analyse import fit_series
-from labrig.fit.least_squares import least_squares
+from labrig.fit.nonlinear_least_squares import least_squares
 from labrig.fit.profile_likelihood import Likelihood, NoiseScale, Quantity, parameter
 from labrig.results import Series
 

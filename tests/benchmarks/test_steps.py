@@ -123,8 +123,8 @@ class NothingRecorded:
     def all_actions(self, device: str) -> Sequence[ActionRecord]:
         return ()
 
-    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
-        return worst
+    def decide(self, name: str, on_bench: Callable[[], T], when_planned: T) -> T:
+        return when_planned
 
     def seed(self) -> int:
         return 0

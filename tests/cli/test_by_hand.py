@@ -22,8 +22,7 @@ from labrig.acquire import (
 )
 from labrig.bench import Recording
 from labrig.bench.found_calibrations import FoundCalibrations
-from labrig.cli.progress import progress
-from labrig.cli.prompt import Terminal
+from labrig.cli.progress import Terminal, progress
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import UsageError
 from labrig.record import read_run

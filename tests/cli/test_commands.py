@@ -60,7 +60,7 @@ def test_unknown_protocols_and_rigs(
         (lambda rig: rig["devices"].update(lmap=rig["devices"].pop("lamp")), "did you mean 'lamp'"),
         (lambda rig: rig["devices"].pop("lamp"), "needs a lamp"),
         (lambda rig: rig["devices"].pop("camera"), "needs a camera"),
-        (lambda rig: rig["devices"]["lamp"].update(driver="numato"), "did you mean 'numato_relay'"),
+        (lambda rig: rig["devices"]["lamp"].update(driver="numatto"), "did you mean 'numato'"),
         (lambda rig: rig["devices"]["lamp"].update(relya=1), "did you mean 'relay'"),
         (lambda rig: rig["devices"]["lamp"].update(relay=99), "relay"),
         (lambda rig: rig["devices"]["lamp"].update(warm_up=15), "unit"),

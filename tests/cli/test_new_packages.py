@@ -76,7 +76,7 @@ def test_a_name_that_is_no_modules_is_one_line(
     assert not (tmp_path / "new").exists()
 
 
-@pytest.mark.parametrize("name", ["numato_relay", "json", "numpy", "labrig"])
+@pytest.mark.parametrize("name", ["numato", "json", "numpy", "labrig"])
 def test_a_name_in_use_is_one_line(labrig: Labrig, tmp_path: Path, name: str) -> None:
     ended = labrig("driver", "new", name, tmp_path / "new")
     assert ended.code == 2

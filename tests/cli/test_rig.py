@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
-from labrig.acquire import read_rig_file
-from labrig.drivers.numato import NumatoRelay
+from labrig.acquire import load_driver, read_rig_file
 from labrig.drivers.ptp.camera import PtpCamera
-from labrig.drivers.serial_relay import SerialRelay
 from labrig.foundation import resources
 from labrig.foundation.errors import DeviceError
 from labrig.foundation.yaml_file import read_yaml, validate, yaml_text
 from labrig.setup import Host
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
+
+NumatoLamp: Any = load_driver("lamp", "numato", "rig.yaml")
+SerialLamp: Any = load_driver("lamp", "serial_relay", "rig.yaml")
 
 Report = dict[str, Any]
 Labrig = Callable[..., Ended]
@@ -144,7 +145,7 @@ def test_a_room_that_is_not_dark_is_reported(labrig: Labrig, make_rig: Make) -> 
 def test_a_device_that_fails_is_shown_and_the_others_are_still_checked(
     labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lamp = NumatoRelay
+    lamp = NumatoLamp
     monkeypatch.setattr(lamp, "is_on", lambda self: False)
     ended = labrig("rig", "check", make_rig(), "--json")
     assert ended.code == 3
@@ -171,7 +172,7 @@ def test_a_fault_in_a_driver_is_one_line_too(
 def test_an_unsafe_end_is_shown_beside_what_was_found(
     labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    numato = NumatoRelay
+    numato = NumatoLamp
     made_safe: list[int] = []
 
     def fail_at_the_end(self: Any) -> None:
@@ -227,7 +228,7 @@ def test_what_is_listed_is_a_rig_file(
     path.write_text(out[out.index("name:") :])
     rig = read_rig_file(path)
     assert {key: entry.address for key, entry in rig.devices.items()} == {"lamp": "COM3"}
-    validate(rig.devices["lamp"].settings(), SerialRelay.Settings, "listed")
+    validate(rig.devices["lamp"].settings(), SerialLamp.Settings, "listed")
     assert out.count("# lamp:") == 2
 
 

@@ -8,10 +8,10 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 from labrig.compare import three_channels
+from labrig.compare.figures import spectra_figure
 from labrig.compare.glow import compare_glow, glow_of
 from labrig.compare.nalbach2017 import TABLE_1, emission
 from labrig.compare.residuals import equally_weighted, fits_by_states, residuals
-from labrig.compare.spectra_figure import spectra_figure
 from labrig.compare.viewing import viewing
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import Material, State, dark_concentration, read_material

@@ -16,8 +16,8 @@ from unittest.mock import patch
 from labrig.foundation.clock import VirtualClock
 from labrig.sim.camera import BodySettings
 from labrig.sim.camera.ptpip import server as ptpip_server
-from labrig.sim.camera.ptpip.connection import Connection
 from labrig.sim.camera.ptpip.packets import Packet, PacketType
+from labrig.sim.camera.ptpip.server import Connection
 
 from . import transcript
 from .gphoto2_commands import MAX_S, READY, STANDARD_READY, TO_CARD, TO_HOST, command

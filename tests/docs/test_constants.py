@@ -8,18 +8,17 @@ from labrig.acquire.roles import camera
 from labrig.bench import execution, guard
 from labrig.fit import luminance
 from labrig.fit.decay import (
-    bend,
     envelope,
+    fit_warnings,
     further_state,
     rate_spectrum,
-    scatter,
-    search,
     selection,
     series,
     states,
+    variable_projection,
 )
 from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
-from labrig.material.reradiation import evidence
+from labrig.material.reradiation import noise
 from labrig.protocols.excitation.analysis import lamp_light
 from labrig.setup import check
 from tests.acceptance.campaigns import ROOT
@@ -33,8 +32,8 @@ STATED = {
     ],
     "explanation/decay_fit.md": [
         f"It is bounded by {100 * envelope.MAX_FLICKER:.0f} %; larger",
-        f"probability of {100 * scatter.PRIOR_OF_CONSTANT:.0f} % that the noise is constant",
-        f"a grid of rates, at most {search.COMBINATIONS},",
+        f"probability of {100 * envelope.PRIOR_OF_CONSTANT:.0f} % that the noise is constant",
+        f"a grid of rates, at most {variable_projection.COMBINATIONS},",
         f"searched from 1/{series.SLOWEST_SPANS:.0f} of the inverse length",
         f"improbable at the level {selection.F_TEST_LEVEL:g}",
         f"known to {100 * states.ILL_DETERMINED:.0f} % or better, or BIC falls by more than "
@@ -45,7 +44,7 @@ STATED = {
         f"prior of $a$ whose scale is {100 * further_state.USUAL_SHARE:.0f} % of all",
         f"where $P > 1/{1 / further_state.POSSIBLE:.0f}$. Where "
         f"$P > 1/{1 / further_state.LIKELY:.0f}$ a",
-        f"$\\beta$ is more than {bend.BEND_SIGMAS:.0f} σ from zero",
+        f"$\\beta$ is more than {fit_warnings.BEND_SIGMAS:.0f} σ from zero",
         f"on a grid of {rate_spectrum.RATES} rates",
         f"more than {selection.PREFERRED_BIC:.0f} in BIC; by more than "
         f"{STRONG_EVIDENCE_DELTA_BIC:.0f} "
@@ -58,8 +57,8 @@ STATED = {
         f"is waited for, for up to {execution.COMES_BACK_S / 60:.0f} min",
     ],
     "how-to/fluorescent.md": [
-        f"some number is {evidence.CLEAR_SIGMAS:.0f} σ above zero and those of both neighbouring "
-        f"columns are {evidence.BESIDE_SIGMAS:.0f} σ",
+        f"some number is {noise.CLEAR_SIGMAS:.0f} σ above zero and those of both neighbouring "
+        f"columns are {noise.BESIDE_SIGMAS:.0f} σ",
     ],
     "how-to/luminance.md": [
         f"within a factor of {math.exp(luminance.NEAR):.1f} in time",

@@ -6,15 +6,16 @@ import pytest
 from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
-from labrig.acquire import FilterWheel, TurnWheel
-from labrig.drivers.maestro import MaestroFilterWheel
-from labrig.drivers.serial_relay import SerialFilterWheel
-from labrig.drivers.thorlabs_fw102c import ThorlabsFilterWheel
+from labrig.acquire import Places, TurnWheel, load_driver
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, ProtocolError, UnclearAnswerError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import Fw102cBoard, MaestroBoard
 from tests.drivers.serial_wire import BoardPort, Script, ScriptedPort, Wired
+
+MaestroFilterWheel: Any = load_driver("filter_wheel", "maestro", "rig.yaml")
+SerialFilterWheel: Any = load_driver("filter_wheel", "serial_relay", "rig.yaml")
+ThorlabsFilterWheel: Any = load_driver("filter_wheel", "thorlabs_fw102c", "rig.yaml")
 
 OPENED: Script = [
     (b"\r", b"\rCommand error CMD_NOT_DEFINED\r> "),
@@ -25,12 +26,12 @@ FILTERS = {"bandpass-450": 2, "bandpass-500": 4}
 COMMANDS = {
     "filters": {"blue": {"send": "turn 2", "answer": "there"}, "red": "turn 3"},
     "open": {"send": "turn 1", "answer": "there"},
-    "turn": "2 s",
+    "travel": "2 s",
     "answers_within": "5 s",
 }
 
 
-def thorlabs(script: Script) -> tuple[ThorlabsFilterWheel, ScriptedPort]:
+def thorlabs(script: Script) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, [*OPENED, *script])
     settings = ThorlabsFilterWheel.Settings(filters=FILTERS)
@@ -47,9 +48,9 @@ def test_the_wheel_is_turned_and_its_slot_read_back() -> None:
             (b"pos?\r", b"pos?\r4\r> "),
         ]
     )
-    assert isinstance(wheel, FilterWheel)
+    assert isinstance(wheel, Places)
     assert "FW102C/FW212C Filter Wheel version 1.07" in wheel.identity()
-    assert wheel.filters() == ("bandpass-450", "bandpass-500")
+    assert wheel.names() == ("bandpass-450", "bandpass-500")
     wheel.put("bandpass-500")
     wheel.put("bandpass-500")
     assert port.script == []
@@ -113,7 +114,7 @@ def test_a_wheel_whose_commands_are_in_the_rig_file() -> None:
     port = ScriptedPort(clock, script)
     settings = validate(COMMANDS, SerialFilterWheel.Settings, "rig.yaml")
     wheel = SerialFilterWheel("COM4", settings, Wired(clock, port))
-    assert isinstance(wheel, FilterWheel)
+    assert isinstance(wheel, Places)
     wheel.put("blue")
     before_s = clock.now()
     wheel.put("red")
@@ -128,7 +129,7 @@ def test_a_wheel_on_a_servo() -> None:
     keys = {"channel": 2, "travel": "1 s", "open": "1000 us", "filters": {"blue": "1400 us"}}
     settings = validate(keys, MaestroFilterWheel.Settings, "rig.yaml")
     wheel = MaestroFilterWheel("COM2", settings, Wired(clock, BoardPort(clock, board)))
-    assert isinstance(wheel, FilterWheel)
+    assert isinstance(wheel, Places)
     wheel.put("blue")
     assert "1400.00 µs" in wheel.identity()
     wheel.make_safe()

@@ -1,20 +1,23 @@
 """Serial lines that are not in order: answers that come late, bytes that nobody sent."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.drivers.lcus import LcusRelay
-from labrig.drivers.maestro import MaestroDoor
-from labrig.drivers.numato import NumatoRelay
-from labrig.drivers.serial_relay import SerialRelay
+from labrig.acquire import load_driver
 from labrig.drivers.text_changer import TextChanger
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import UnclearAnswerError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import ArduinoBoard, ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard
 from tests.drivers.serial_wire import Board, BoardPort, InterruptingClock, Wired
+
+LcusLamp: Any = load_driver("lamp", "lcus", "rig.yaml")
+MaestroDoor: Any = load_driver("door", "maestro", "rig.yaml")
+NumatoLamp: Any = load_driver("lamp", "numato", "rig.yaml")
+SerialLamp: Any = load_driver("lamp", "serial_relay", "rig.yaml")
 
 LATE_S = 0.06
 SKETCH = {
@@ -25,25 +28,25 @@ SKETCH = {
 DOOR = {"channel": 0, "closed": "1000 us", "open": "1500 us", "travel": "20 ms"}
 
 
-def numato(clock: VirtualClock, late_s: float) -> tuple[NumatoRelay, NumatoBoard]:
+def numato(clock: VirtualClock, late_s: float) -> tuple[Any, NumatoBoard]:
     board = NumatoBoard(8, lambda relay, on: None)
     wired = Wired(clock, BoardPort(clock, board, late_s))
-    return NumatoRelay("COM3", NumatoRelay.Settings(relay=0), wired), board
+    return NumatoLamp("COM3", NumatoLamp.Settings(relay=0), wired), board
 
 
-def lcus(clock: VirtualClock, late_s: float) -> tuple[LcusRelay, LcusBoard]:
+def lcus(clock: VirtualClock, late_s: float) -> tuple[Any, LcusBoard]:
     board = LcusBoard(2, lambda relay, on: None, "text")
     wired = Wired(clock, BoardPort(clock, board, late_s))
-    return LcusRelay("COM5", LcusRelay.Settings(relay=1), wired), board
+    return LcusLamp("COM5", LcusLamp.Settings(relay=1), wired), board
 
 
-def arduino(clock: VirtualClock, late_s: float) -> tuple[SerialRelay, ArduinoBoard]:
+def arduino(clock: VirtualClock, late_s: float) -> tuple[Any, ArduinoBoard]:
     board = ArduinoBoard(2, lambda relay, on: None, clock)
-    settings = validate(SKETCH, SerialRelay.Settings, "rig.yaml")
-    return SerialRelay("COM7", settings, Wired(clock, BoardPort(clock, board, late_s))), board
+    settings = validate(SKETCH, SerialLamp.Settings, "rig.yaml")
+    return SerialLamp("COM7", settings, Wired(clock, BoardPort(clock, board, late_s))), board
 
 
-Make = Callable[[VirtualClock, float], tuple[NumatoRelay, NumatoBoard]]
+Make = Callable[[VirtualClock, float], tuple[Any, NumatoBoard]]
 
 
 @pytest.mark.parametrize("make", [numato, lcus, arduino])
@@ -66,7 +69,7 @@ def test_a_servo_board_that_answers_late_is_usable() -> None:
     settings = validate(DOOR, MaestroDoor.Settings, "rig.yaml")
     door = MaestroDoor("COM6", settings, Wired(clock, BoardPort(clock, board, LATE_S)))
     door.make_safe()
-    door.open()
+    door.swing(safe=False)
     door.make_safe()
     assert [round(pulse.width_s * 1e6) for pulse in board.pulses(0)] == [1000, 1500, 1000]
 
@@ -106,19 +109,19 @@ def test_stray_bytes_are_an_unclear_answer_and_the_next_one_is_clear(stray: byte
     clock = VirtualClock()
     board = Straying(NumatoBoard(8, lambda relay, on: None))
     wired = Wired(clock, BoardPort(clock, board))
-    require_clear_after(stray, board, NumatoRelay("COM3", NumatoRelay.Settings(relay=0), wired))
+    require_clear_after(stray, board, NumatoLamp("COM3", NumatoLamp.Settings(relay=0), wired))
 
 
 @given(st.sampled_from(STRAY))
 def test_stray_bytes_before_the_answers_of_the_rig_file(stray: bytes) -> None:
     clock = VirtualClock()
     board = Straying(ArduinoBoard(2, lambda relay, on: None, clock))
-    settings = validate(SKETCH, SerialRelay.Settings, "rig.yaml")
-    relay = SerialRelay("COM3", settings, Wired(clock, BoardPort(clock, board)))
+    settings = validate(SKETCH, SerialLamp.Settings, "rig.yaml")
+    relay = SerialLamp("COM3", settings, Wired(clock, BoardPort(clock, board)))
     require_clear_after(stray, board, relay)
 
 
-def require_clear_after(stray: bytes, board: Straying, relay: NumatoRelay | SerialRelay) -> None:
+def require_clear_after(stray: bytes, board: Straying, relay: Any) -> None:
     for act in (relay.on, relay.off, relay.is_on):
         board.stray = stray
         with pytest.raises(UnclearAnswerError):
@@ -131,7 +134,7 @@ def test_lines_that_a_board_sends_of_its_own_accord_are_no_answers() -> None:
     clock = VirtualClock()
     board = ArduinoBoard(2, lambda relay, on: None, clock)
     port = BoardPort(clock, board)
-    relay = SerialRelay("COM3", validate(SKETCH, SerialRelay.Settings, "x"), Wired(clock, port))
+    relay = SerialLamp("COM3", validate(SKETCH, SerialLamp.Settings, "x"), Wired(clock, port))
     for act, on in ((relay.on, True), (relay.off, False)):
         port.write(b"version\nalive\n")
         clock.sleep(1.0)

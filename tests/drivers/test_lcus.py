@@ -1,10 +1,12 @@
 """The LCUS driver against wire transcripts and against the emulated board."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Checkable, Lamp
-from labrig.drivers.lcus import LcusRelay, command, relay_states
+from labrig.acquire import Checkable, Lamp, load_driver
+from labrig.drivers.lcus import command, relay_states
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.sim.boards import LcusBoard
@@ -17,16 +19,18 @@ from tests.drivers.serial_wire import (
     Wired,
 )
 
+LcusLamp: Any = load_driver("lamp", "lcus", "rig.yaml")
+
 ON_1, OFF_1 = bytes.fromhex("A00101A2"), bytes.fromhex("A00100A1")
 ON_2, OFF_2 = bytes.fromhex("A00201A3"), bytes.fromhex("A00200A2")
 QUERY = b"\xff"
 ANSWERS: tuple[Answers, ...] = ("nothing", "text", "bytes")
 
 
-def lamp(script: Script, relay: int = 1) -> tuple[LcusRelay, ScriptedPort]:
+def lamp(script: Script, relay: int = 1) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, script)
-    return LcusRelay("COM5", LcusRelay.Settings(relay=relay), Wired(clock, port)), port
+    return LcusLamp("COM5", LcusLamp.Settings(relay=relay), Wired(clock, port)), port
 
 
 def asked(first: bytes, second: bytes) -> Script:
@@ -118,7 +122,7 @@ def test_a_board_that_fell_silent_is_reported() -> None:
 def test_the_command_has_left_when_it_returns_and_no_sooner() -> None:
     clock = VirtualClock()
     board = LcusBoard(1, lambda relay, on: None)
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
     before_s = clock.now()
     driver.on()
     assert clock.now() - before_s == pytest.approx(4 * 10 / 9600)
@@ -130,7 +134,7 @@ def test_the_driver_and_the_emulated_board(answers: Answers) -> None:
     moved: list[tuple[int, bool]] = []
     board = LcusBoard(4, lambda relay, on: moved.append((relay, on)), answers)
     board.states[2] = True
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=3), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=3), Wired(clock, BoardPort(clock, board)))
     assert moved == [(3, False)], "off at connect"
     for on in (True, False, True):
         (driver.on if on else driver.off)()
@@ -144,7 +148,7 @@ def test_the_driver_and_the_emulated_board(answers: Answers) -> None:
 def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, answers: Answers) -> None:
     clock = InterruptingClock()
     board = LcusBoard(2, lambda relay, on: None, answers)
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
     with clock.interrupted_after(waits):
         driver.on()
         driver.is_on()
@@ -159,7 +163,7 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, answers: Answe
 def test_half_a_command_of_another_program_does_not_keep_the_lamp_on(torn: bytes) -> None:
     clock = VirtualClock()
     board = LcusBoard(2, lambda relay, on: None)
-    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    driver = LcusLamp("COM5", LcusLamp.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
     driver.on()
     board.receive(torn)
     driver.make_safe()
@@ -197,3 +201,92 @@ def test_any_answer_is_understood_or_a_device_error(answer: bytes) -> None:
 @given(st.binary(max_size=40), st.sampled_from(ANSWERS))
 def test_the_board_answers_any_bytes(data: bytes, answers: Answers) -> None:
     LcusBoard(8, lambda relay, on: None, answers).receive(data)
+
+
+EIGHT: dict[str, Any] = {f"{365 + 40 * n} nm": n + 1 for n in range(8)}
+
+
+def eight(role: str, wired: Wired, channels: dict[str, Any] = EIGHT) -> Any:
+    bank = load_driver(role, "lcus", "rig.yaml")
+    return bank("COM5", bank.Settings.model_validate({"channels": channels}), wired)
+
+
+def off(relay: int) -> tuple[bytes, bytes]:
+    return command(relay, on=False), b""
+
+
+@pytest.mark.parametrize("role", ["leds", "illuminants"])
+def test_eight_relays_drive_a_bank_of_lights(role: str) -> None:
+    none, third = b"\0" * 8, b"\0\0\1\0\0\0\0\0"
+    clock = VirtualClock()
+    port = ScriptedPort(
+        clock,
+        [
+            off(1),
+            *asked(none, none),
+            *map(off, range(2, 9)),  # off at connect, and the board is asked once
+            (command(3, on=True), b""),
+            *asked(third, third),
+            *(off(3), (command(8, on=True), b"")),
+            *asked(third, b"\0" * 7 + b"\1"),
+            off(8),
+            *asked(none, none), *asked(none, none),  # for its identity, twice
+            *map(off, range(1, 9)), *map(off, range(1, 9)),
+            *asked(none, none),
+        ],
+    )  # fmt: skip
+    driver = eight(role, Wired(clock, port))
+    assert driver.channels() == tuple(EIGHT)
+    driver.light("445 nm")
+    assert driver.channel_on() == "445 nm"
+    driver.light("645 nm")
+    assert driver.channel_on() == "645 nm"
+    driver.dark()
+    assert driver.identity().startswith("LCUS relay board (8 relays, read back by query), ")
+    assert "645 nm on relay 8" in driver.identity()
+    driver.make_safe()
+    assert port.script == []
+
+
+def test_a_light_of_a_bank_that_stays_on_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = VirtualClock()
+    board = LcusBoard(8, lambda relay, on: None, "bytes")
+    driver = eight("leds", Wired(clock, BoardPort(clock, board)))
+
+    board.states[4] = True
+    monkeypatch.setattr(board, "_obey", lambda command: None)
+    with pytest.raises(DeviceError, match=r"relay 5 .* was switched off but reads on"):
+        driver.make_safe()
+
+
+def test_a_relay_that_the_board_has_not_is_refused_before_anything_is_lit() -> None:
+    clock = VirtualClock()
+    board = LcusBoard(4, lambda relay, on: None, "text")
+    driver = eight("leds", Wired(clock, BoardPort(clock, board)))
+    with pytest.raises(DeviceError, match=r"was asked for relay 8: .* has it that many relays"):
+        driver.make_safe()
+
+
+@given(
+    sequence=st.lists(st.sampled_from([*EIGHT, None]), max_size=6),
+    waits=st.integers(1, 200),
+    answers=st.sampled_from(ANSWERS),
+)
+def test_two_lights_are_never_lit_and_after_any_interruption_all_go_off(
+    sequence: list[str | None], waits: int, answers: Answers
+) -> None:
+    clock = InterruptingClock()
+    lit_at_once: list[int] = []
+    board = LcusBoard(8, lambda relay, on: lit_at_once.append(sum(board.states)), answers)
+    driver = eight("leds", Wired(clock, BoardPort(clock, board)))
+    with clock.interrupted_after(waits):
+        for channel in sequence:
+            if channel is None:
+                driver.dark()
+            else:
+                driver.light(channel)
+            assert driver.channel_on() == channel
+    assert max(lit_at_once, default=0) <= 1
+    driver.make_safe()
+    assert not any(board.states)
+    assert driver.channel_on() is None

@@ -5,14 +5,16 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Guarded, LampShield, TrapDoor
-from labrig.drivers.maestro import MaestroDoor, MaestroShield
-from labrig.drivers.maestro.servo import ERRORS, Wire, error_text, quarters, seven_bits
+from labrig.acquire import Guarded, Swing, load_driver
+from labrig.drivers.maestro import ERRORS, Wire, error_text, quarters, seven_bits
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import MaestroBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
+
+MaestroDoor: Any = load_driver("door", "maestro", "rig.yaml")
+MaestroShield: Any = load_driver("shield", "maestro", "rig.yaml")
 
 KEYS = {"channel": 2, "closed": "1000 us", "open": "1500 us", "travel": "280 ms"}
 FINE = (b"\xa1", b"\0\0")
@@ -23,11 +25,11 @@ WHERE = bytes.fromhex("9002")
 NO_LIMITS: Script = [(bytes.fromhex("87020000"), b""), (bytes.fromhex("89020000"), b"")]
 
 
-def settings(**keys: Any) -> MaestroDoor.Settings:
+def settings(**keys: Any) -> Any:
     return validate({**KEYS, **keys}, MaestroDoor.Settings, "rig.yaml")
 
 
-def door(script: Script, **keys: Any) -> tuple[MaestroDoor, ScriptedPort]:
+def door(script: Script, **keys: Any) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, [FINE, FINE, *script])
     return MaestroDoor("COM6", settings(**keys), Wired(clock, port)), port
@@ -42,10 +44,10 @@ def test_targets_errors_and_pulses_on_the_wire() -> None:
             FINE,
         ]
     )
-    assert isinstance(driver, TrapDoor)
-    assert isinstance(driver, Guarded)
-    driver.open()
-    driver.close()
+    assert issubclass(MaestroDoor, Swing)
+    assert issubclass(MaestroDoor, Guarded)
+    driver.swing(safe=False)
+    driver.swing(safe=True)
     assert driver.identity() == (
         "Pololu Maestro servo controller, trap door on channel 2, pulse 1000.00 µs"
     )
@@ -87,7 +89,7 @@ def test_limits_are_set_and_the_ramp_is_waited_for_when_it_has_to_be_safe() -> N
         acceleration=7,
     )
     driver.make_safe()
-    driver.open()
+    driver.swing(safe=False)
     assert port.script == []
 
 
@@ -101,7 +103,7 @@ def test_one_maestro_of_several_is_called_by_its_number() -> None:
         (bytes.fromhex("AA0C1002"), OPEN),
     ]
     port = ScriptedPort(clock, script)
-    MaestroDoor("COM6", settings(device_number=12), Wired(clock, port)).open()
+    MaestroDoor("COM6", settings(device_number=12), Wired(clock, port)).swing(safe=False)
     assert port.script == []
 
 
@@ -109,7 +111,7 @@ def test_one_maestro_of_several_is_called_by_its_number() -> None:
 def test_each_error_is_named_with_what_to_do(bit: int) -> None:
     driver, _ = door([(GO_OPEN, b""), (b"\xa1", (1 << bit).to_bytes(2, "little"))])
     with pytest.raises(DeviceError) as refusal:
-        driver.open()
+        driver.swing(safe=False)
     said = str(refusal.value)
     assert ERRORS[bit][0] in said
     assert ERRORS[bit][1] in said
@@ -140,12 +142,12 @@ def test_the_watchdog_is_called_so() -> None:
 def test_what_does_not_answer_or_obey(script: Script, error: type[DeviceError], said: str) -> None:
     driver, _ = door(script)
     with pytest.raises(error) as refusal:
-        driver.open()
+        driver.swing(safe=False)
     assert said in str(refusal.value)
 
 
 def test_two_equal_pulses_are_refused() -> None:
-    with pytest.raises(Exception, match="two different pulses for 'closed' and 'open'"):
+    with pytest.raises(Exception, match="two different positions for 'closed' and 'open'"):
         settings(open="1000 us")
 
 
@@ -196,10 +198,10 @@ class Bench:
 @pytest.mark.parametrize("keys", [{}, {"device_number": 12}, {"speed": 140, "acceleration": 7}])
 def test_two_channels_of_the_emulated_board(keys: dict[str, Any]) -> None:
     bench = Bench(VirtualClock(), **keys)
-    assert isinstance(bench.shield, LampShield)
-    bench.shield.cover()
-    bench.door.open()
-    bench.door.close()
+    assert issubclass(MaestroShield, Swing)
+    bench.shield.swing(safe=False)
+    bench.door.swing(safe=False)
+    bench.door.swing(safe=True)
     bench.door.make_safe()
     bench.shield.make_safe()
     assert bench.widths_us(2) == [1000, 1500, 1000]
@@ -208,7 +210,7 @@ def test_two_channels_of_the_emulated_board(keys: dict[str, Any]) -> None:
 
 def test_the_time_out_closes_the_door_and_is_reported() -> None:
     bench = Bench(VirtualClock(), time_out_s=10.0)
-    bench.door.open()
+    bench.door.swing(safe=False)
     opened_s = bench.clock.now()
     bench.clock.sleep(8.0)
     bench.door.heartbeat()
@@ -218,27 +220,27 @@ def test_the_time_out_closes_the_door_and_is_reported() -> None:
     assert bench.widths_us(2) == [1000, 1500, 1000]
     assert bench.board.pulses(2)[-1].at_s == pytest.approx(opened_s + 18.0, abs=0.1)
     with pytest.raises(DeviceError, match="serial time-out"):
-        bench.door.open()
+        bench.door.swing(safe=False)
     bench.door.make_safe()
-    bench.door.open()
+    bench.door.swing(safe=False)
     bench.door.make_safe()
 
 
 def test_a_pulse_outside_the_channels_range_is_reported() -> None:
     bench = Bench(VirtualClock(), open="2600 us")
     with pytest.raises(DeviceError, match=r"set to send 2600\.00 µs and sends 2500\.00 µs"):
-        bench.door.open()
+        bench.door.swing(safe=False)
 
 
 def test_another_programs_half_command_does_not_keep_the_door_open() -> None:
     bench = Bench(VirtualClock())
-    bench.door.open()
+    bench.door.swing(safe=False)
     bench.board.receive(b"\x84\x02")
     bench.door.make_safe()
     assert bench.widths_us(2)[-1] == 1000
     bench.board.receive(b"\x84\x02")
     with pytest.raises(DeviceError, match="did not understand a command"):
-        bench.door.open()
+        bench.door.swing(safe=False)
 
 
 @given(waits=st.integers(0, 60), keys=st.sampled_from([{}, {"speed": 140}]))
@@ -246,9 +248,9 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, keys: dict[str
     clock = InterruptingClock()
     bench = Bench(clock, **keys)
     with clock.interrupted_after(waits):
-        bench.door.open()
-        bench.door.close()
-        bench.door.open()
+        bench.door.swing(safe=False)
+        bench.door.swing(safe=True)
+        bench.door.swing(safe=False)
     bench.door.make_safe()
     assert bench.widths_us(2)[-1] == 1000
 

@@ -1,22 +1,25 @@
 """The Numato driver against wire transcripts and against the emulated board."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Lamp
-from labrig.drivers.numato import NumatoRelay
+from labrig.acquire import Lamp, load_driver
 from labrig.drivers.serial_line import SerialLine
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError
 from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, ScriptedPort, Wired
 
+NumatoLamp: Any = load_driver("lamp", "numato", "rig.yaml")
 
-def lamp(script: list[tuple[bytes, bytes]], relay: int = 0) -> tuple[NumatoRelay, ScriptedPort]:
+
+def lamp(script: list[tuple[bytes, bytes]], relay: int = 0) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, [(b"\r", b"\n\r>"), *script])
-    settings = NumatoRelay.Settings(relay=relay)
-    return NumatoRelay("COM3", settings, Wired(clock, port)), port
+    settings = NumatoLamp.Settings(relay=relay)
+    return NumatoLamp("COM3", settings, Wired(clock, port)), port
 
 
 def test_on_and_off_are_read_back() -> None:
@@ -69,9 +72,7 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int) -> None:
     clock = InterruptingClock()
     moved: list[tuple[int, bool]] = []
     board = NumatoBoard(8, lambda relay, on: moved.append((relay, on)))
-    driver = NumatoRelay(
-        "COM3", NumatoRelay.Settings(relay=0), Wired(clock, BoardPort(clock, board))
-    )
+    driver = NumatoLamp("COM3", NumatoLamp.Settings(relay=0), Wired(clock, BoardPort(clock, board)))
     with clock.interrupted_after(waits):
         driver.on()
         driver.off()

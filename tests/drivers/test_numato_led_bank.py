@@ -1,15 +1,19 @@
 """LEDs behind a Numato board: wire transcripts, and never two lit, whatever happens."""
 
+from typing import Any
+
 import pytest
 from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
-from labrig.acquire import LedBank
-from labrig.drivers.numato import NumatoLedBank, NumatoRelay
+from labrig.acquire import LightBank, load_driver
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError
 from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
+
+NumatoLeds: Any = load_driver("leds", "numato", "rig.yaml")
+NumatoLamp: Any = load_driver("lamp", "numato", "rig.yaml")
 
 OPENED = (b"\r", b"\n\r>")
 RELAYS = {"450 nm": 1, "525 nm": 2, "far red": 10}
@@ -29,18 +33,18 @@ def read(relay: str, state: str) -> Script:
 ALL_OFF = [*switched("off", "1"), *switched("off", "2"), *switched("off", "A")]
 
 
-def bank(script: Script) -> tuple[NumatoLedBank, ScriptedPort]:
+def bank(script: Script) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, [OPENED, *script])
-    driver = NumatoLedBank(
-        "COM3", NumatoLedBank.Settings.model_validate({"relays": RELAYS}), Wired(clock, port)
+    driver = NumatoLeds(
+        "COM3", NumatoLeds.Settings.model_validate({"channels": RELAYS}), Wired(clock, port)
     )
     return driver, port
 
 
-def on_a_board(clock: VirtualClock, board: NumatoBoard) -> NumatoLedBank:
+def on_a_board(clock: VirtualClock, board: NumatoBoard) -> Any:
     wired = Wired(clock, BoardPort(clock, board))
-    return NumatoLedBank("COM3", NumatoLedBank.Settings(relays={"a": 1, "b": 2, "c": 3}), wired)
+    return NumatoLeds("COM3", NumatoLeds.Settings(channels={"a": 1, "b": 2, "c": 3}), wired)
 
 
 def test_one_is_off_and_read_back_before_the_next_is_on() -> None:
@@ -56,7 +60,7 @@ def test_one_is_off_and_read_back_before_the_next_is_on() -> None:
             (b"ver\r", b"ver\n\r00000008\n\r>"), (b"id get\r", b"id get\n\r12345678\n\r>"),
         ]
     )  # fmt: skip
-    assert isinstance(driver, LedBank)
+    assert isinstance(driver, LightBank)
     assert driver.channels() == tuple(RELAYS)
     assert driver.reads_back()
     driver.dark()
@@ -139,8 +143,8 @@ def test_lamp_and_leds_share_a_line() -> None:
     clock = VirtualClock()
     board = NumatoBoard(8, lambda relay, on: None)
     wired = Wired(clock, BoardPort(clock, board))
-    lamp = NumatoRelay("COM3", NumatoRelay.Settings(relay=0), wired)
-    leds = NumatoLedBank("COM3", NumatoLedBank.Settings(relays={"a": 1, "b": 2}), wired)
+    lamp = NumatoLamp("COM3", NumatoLamp.Settings(relay=0), wired)
+    leds = NumatoLeds("COM3", NumatoLeds.Settings(channels={"a": 1, "b": 2}), wired)
     lamp.on()
     leds.light("b")
     leds.make_safe()
@@ -154,4 +158,4 @@ def test_lamp_and_leds_share_a_line() -> None:
 )  # fmt: skip
 def test_each_led_has_a_name_and_a_relay_of_its_own(keys: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
-        NumatoLedBank.Settings.model_validate(keys)
+        NumatoLeds.Settings.model_validate(keys)

@@ -1,17 +1,20 @@
 """The thermometer on a Numato board: wire transcripts, what is wrong with it, and a shared line."""
 
 from contextlib import suppress
+from typing import Any
 
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.acquire import Thermometer
-from labrig.drivers.numato import NumatoRelay, NumatoThermometer
-from labrig.drivers.numato.thermometer import CONVERSIONS, PLAUSIBLE_C
+from labrig.acquire import Thermometer, load_driver
+from labrig.drivers.numato import CONVERSIONS, PLAUSIBLE_C
 from labrig.foundation.clock import Interrupted, VirtualClock
 from labrig.foundation.errors import DeviceError
 from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
+
+NumatoLamp: Any = load_driver("lamp", "numato", "rig.yaml")
+NumatoThermometer: Any = load_driver("thermometer", "numato", "rig.yaml")
 
 OPENED = (b"\r", b"\n\r>")
 
@@ -22,7 +25,7 @@ def read(step: int, number: int = 0) -> tuple[bytes, bytes]:
     return f"{command}\r".encode(), f"{command}\n\r{step:04d}\n\r>".encode()
 
 
-def thermometer(script: Script, **keys: float) -> tuple[NumatoThermometer, ScriptedPort]:
+def thermometer(script: Script, **keys: float) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, [OPENED, *script])
     settings = NumatoThermometer.Settings.model_validate(keys)
@@ -36,7 +39,7 @@ def test_the_mean_of_many_conversions_is_finer_than_a_step() -> None:
     )
     assert isinstance(driver, Thermometer)
     assert driver.celsius() == pytest.approx((147.5 / 1023 * 5 - 0.5) * 100)
-    assert driver.identity() == "Numato board, firmware 00000008, id 7, analogue input 0"
+    assert driver.identity() == "Numato relay board, firmware 00000008, id 7, analogue input 0"
     assert port.script == []
 
 
@@ -119,7 +122,7 @@ def test_relay_and_thermometer_share_a_line() -> None:
     clock = VirtualClock()
     board = NumatoBoard(8, lambda relay, on: None, {0: lambda: 0.71})
     wired = Wired(clock, BoardPort(clock, board))
-    lamp = NumatoRelay("COM3", NumatoRelay.Settings(relay=0), wired)
+    lamp = NumatoLamp("COM3", NumatoLamp.Settings(relay=0), wired)
     warmth = NumatoThermometer("COM3", NumatoThermometer.Settings(), wired)
     opened = NumatoThermometer("COM3", NumatoThermometer.Settings(input=1), wired)
     lamp.on()
@@ -137,7 +140,7 @@ def test_an_interrupted_reading_does_not_keep_the_lamp_on(waits: int) -> None:
     clock = InterruptingClock()
     board = NumatoBoard(8, lambda relay, on: None, {0: lambda: 0.71})
     wired = Wired(clock, BoardPort(clock, board))
-    lamp = NumatoRelay("COM3", NumatoRelay.Settings(relay=0), wired)
+    lamp = NumatoLamp("COM3", NumatoLamp.Settings(relay=0), wired)
     warmth = NumatoThermometer("COM3", NumatoThermometer.Settings(), wired)
     lamp.on()
     clock.waits_left = waits

@@ -16,8 +16,8 @@ from tests.terminal import idle_guard, on_a_terminal
 RIG = """
 name: two boards
 devices:
-  lamp: {{driver: lcus_relay, address: "{lcus}", relay: 2}}
-  door: {{driver: maestro_door, address: "{maestro}", channel: 3, closed: 1000 us, open: 1877.5 us,
+  lamp: {{driver: lcus, address: "{lcus}", relay: 2}}
+  door: {{driver: maestro, address: "{maestro}", channel: 3, closed: 1000 us, open: 1877.5 us,
           travel: 20 ms}}
 """
 
@@ -53,7 +53,7 @@ def test_lamp_and_door(open_ports: Callable[[Board], str], tmp_path: Path) -> No
             assert not lcus.states[1]
             rig[LAMP].on()
             assert rig[LAMP].is_on()
-            rig[DOOR].open()
+            rig[DOOR].swing(safe=False)
             assert "pulse 1877.50 µs" in rig.identities()["door"]
         assert not lcus.states[1]
     assert [pulse.width_s * 1e6 for pulse in maestro.pulses(3)] == pytest.approx(

@@ -5,14 +5,15 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from labrig.acquire import SampleChanger
-from labrig.drivers.maestro import MaestroSampleChanger
-from labrig.drivers.serial_relay import SerialSampleChanger
+from labrig.acquire import SampleChanger, load_driver
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import UnclearAnswerError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.boards import MaestroBoard
 from tests.drivers.serial_wire import BoardPort, ScriptedPort, Wired
+
+MaestroSampleChanger: Any = load_driver("sample_changer", "maestro", "rig.yaml")
+SerialSampleChanger: Any = load_driver("sample_changer", "serial_relay", "rig.yaml")
 
 SERVO = {
     "channel": 3,
@@ -23,7 +24,7 @@ SERVO = {
 BOARD = {
     "samples": {"blue paint": {"send": "turn 2", "answer": "there"}, "green paint": "turn 3"},
     "away": {"send": "turn 1", "answer": "there"},
-    "turn": "2 s",
+    "travel": "2 s",
 }
 
 
@@ -33,7 +34,7 @@ def test_a_changer_on_a_servo() -> None:
     settings = validate(SERVO, MaestroSampleChanger.Settings, "rig.yaml")
     changer = MaestroSampleChanger("COM2", settings, Wired(clock, BoardPort(clock, board)))
     assert isinstance(changer, SampleChanger)
-    assert changer.samples() == MaestroSampleChanger.declared_samples(settings)
+    assert changer.names() == tuple(settings.samples)
     changer.put("green paint")
     assert "sample changer on channel 3, pulse 1600.00 µs" in changer.identity()
     changer.make_safe()

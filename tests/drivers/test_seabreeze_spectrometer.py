@@ -24,7 +24,7 @@ from labrig.optics import Spectrum, lamp_calibration
 from labrig.sim import OpenRoom, open_room
 from labrig.sim.lamp import WAVELENGTH_NM
 from labrig.sim.leds import led_spectrum
-from labrig.sim.spectrometer.detector import UNIT_IRRADIANCE, Detector
+from labrig.sim.spectrometer.instrument import UNIT_IRRADIANCE, Detector
 
 pytest.importorskip("seabreeze")
 

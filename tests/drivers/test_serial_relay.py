@@ -6,8 +6,7 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Checkable, Guarded, Lamp, LedBank
-from labrig.drivers.serial_relay import SerialLedBank, SerialRelay
+from labrig.acquire import Checkable, Guarded, Lamp, LightBank, load_driver
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, DeviceLostError, UnclearAnswerError
 from labrig.foundation.yaml_file import validate
@@ -20,6 +19,9 @@ from tests.drivers.serial_wire import (
     ScriptedPort,
     Wired,
 )
+
+SerialLeds: Any = load_driver("leds", "serial_relay", "rig.yaml")
+SerialLamp: Any = load_driver("lamp", "serial_relay", "rig.yaml")
 
 Keys = dict[str, Any]
 
@@ -57,18 +59,18 @@ BOARDS: dict[str, tuple[Keys, Callable[[VirtualClock], ArduinoBoard | LcusBoard 
 }
 
 
-def settings(keys: Keys) -> SerialRelay.Settings:
-    return validate(keys, SerialRelay.Settings, "rig.yaml, devices.lamp")
+def settings(keys: Keys) -> Any:
+    return validate(keys, SerialLamp.Settings, "rig.yaml, devices.lamp")
 
 
-def lamp(keys: Keys, script: Script) -> tuple[SerialRelay, ScriptedPort]:
+def lamp(keys: Keys, script: Script) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, script)
-    return SerialRelay("COM5", settings(keys), Wired(clock, port)), port
+    return SerialLamp("COM5", settings(keys), Wired(clock, port)), port
 
 
-def on_board(keys: Keys, clock: VirtualClock, board: Board) -> SerialRelay:
-    return SerialRelay("COM5", settings(keys), Wired(clock, BoardPort(clock, board)))
+def on_board(keys: Keys, clock: VirtualClock, board: Board) -> Any:
+    return SerialLamp("COM5", settings(keys), Wired(clock, BoardPort(clock, board)))
 
 
 def test_text_is_confirmed_and_read_back() -> None:
@@ -268,11 +270,11 @@ def test_the_watchdog_of_the_firmware_is_kept_quiet_and_noticed() -> None:
     driver.heartbeat()
 
 
-def bank(clock: VirtualClock, board: Board, keys: Keys | None = None) -> SerialLedBank:
+def bank(clock: VirtualClock, board: Board, keys: Keys | None = None) -> Any:
     channels = {"channels": {"450 nm": sketch(1), "525 nm": sketch(2)}} if keys is None else keys
-    return SerialLedBank(
+    return SerialLeds(
         "COM5",
-        validate(channels, SerialLedBank.Settings, "rig.yaml, devices.leds"),
+        validate(channels, SerialLeds.Settings, "rig.yaml, devices.leds"),
         Wired(clock, BoardPort(clock, board)),
     )
 
@@ -307,7 +309,7 @@ def test_lamp_and_leds_share_a_line() -> None:
     clock = VirtualClock()
     board = ArduinoBoard(3, lambda relay, on: None, clock)
     relay, leds = on_board(ARDUINO, clock, board), bank(clock, board)
-    assert isinstance(leds, LedBank)
+    assert issubclass(SerialLeds, LightBank)
     assert leds.channels() == ("450 nm", "525 nm")
     assert leds.reads_back()
     relay.on()

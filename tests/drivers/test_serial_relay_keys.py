@@ -5,17 +5,20 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.drivers.serial_relay import SerialLedBank, SerialRelay
-from labrig.drivers.serial_relay.wire_text import wire_text
+from labrig.acquire import load_driver
+from labrig.drivers.serial_relay.settings import wire_text
 from labrig.foundation.errors import UsageError
 from labrig.foundation.yaml_file import validate
+
+SerialLeds: Any = load_driver("leds", "serial_relay", "rig.yaml")
+SerialLamp: Any = load_driver("lamp", "serial_relay", "rig.yaml")
 
 Keys = dict[str, Any]
 MINIMAL: Keys = {"on": "1", "off": "0"}
 
 
-def settings(keys: Keys) -> SerialRelay.Settings:
-    return validate(keys, SerialRelay.Settings, "rig.yaml, devices.lamp")
+def settings(keys: Keys) -> Any:
+    return validate(keys, SerialLamp.Settings, "rig.yaml, devices.lamp")
 
 
 def escaped(content: bytes) -> str:
@@ -95,4 +98,4 @@ def test_a_bad_entry_is_one_line(keys: Keys, said: str) -> None:
                                   {"channels": {"a": MINIMAL, "b": MINIMAL}}])  # fmt: skip
 def test_each_led_has_a_name_and_a_command_of_its_own(keys: Keys) -> None:
     with pytest.raises(UsageError):
-        validate(keys, SerialLedBank.Settings, "rig.yaml")
+        validate(keys, SerialLeds.Settings, "rig.yaml")

@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
-from labrig.acquire import LedBank
-from labrig.drivers.thorlabs_dc4100 import ThorlabsLedBank
+from labrig.acquire import LightBank, load_driver
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
 from labrig.sim.boards import Dc4100Board
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
+
+ThorlabsLeds: Any = load_driver("leds", "thorlabs_dc4100", "rig.yaml")
 
 CHANNELS: dict[str, Any] = {
     "455 nm": {"output": 1, "brightness": "60 %", "centre": 455, "fwhm": 18, "settling": "0.5 s"},
@@ -49,12 +50,12 @@ def lit(output: int, per_cent: int, status: str = "0", state: str = "1") -> Scri
     ]  # fmt: skip
 
 
-def bank(script: Script, **keys: Any) -> tuple[ThorlabsLedBank, ScriptedPort]:
+def bank(script: Script, **keys: Any) -> tuple[Any, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, list(script))
     content = {"channels": CHANNELS} | keys
-    chosen = ThorlabsLedBank.Settings.model_validate(content)
-    return ThorlabsLedBank("COM7", chosen, Wired(clock, port)), port
+    chosen = ThorlabsLeds.Settings.model_validate(content)
+    return ThorlabsLeds("COM7", chosen, Wired(clock, port)), port
 
 
 class Heads:
@@ -98,7 +99,7 @@ def test_it_is_identified_darkened_and_set_before_one_is_lit() -> None:
             *SYNC, *ALL_OFF,
         ]
     )  # fmt: skip
-    assert isinstance(driver, LedBank)
+    assert issubclass(ThorlabsLeds, LightBank)
     assert driver.channels() == tuple(CHANNELS)
     assert driver.reads_back()
     assert [driver.settling_s(name) for name in CHANNELS] == [0.5, 0.0]
@@ -196,14 +197,14 @@ def test_a_head_a_little_off_is_a_warning() -> None:
     assert "says 462 nm, the rig file's peak is 455 nm" in finding.what
 
 
-def nine() -> ThorlabsLedBank.Settings:
+def nine() -> Any:
     """Nine LEDs on three units."""
     channels = {}
     for number in range(9):
         channels[f"{400 + 40 * number} nm"] = {
             "output": number % 4 + 1, "centre": 400 + 40 * number, "fwhm": 20, "brightness": "50 %",
         } | ({"address": f"COM{8 + number // 4}"} if number >= 4 else {})  # fmt: skip
-    return ThorlabsLedBank.Settings.model_validate({"channels": channels})
+    return ThorlabsLeds.Settings.model_validate({"channels": channels})
 
 
 def three_units(heads: Heads) -> Iterator[tuple[str, Dc4100Board]]:
@@ -231,7 +232,7 @@ def test_over_three_units_two_are_never_lit_and_any_interruption_can_be_made_saf
     clock, heads = InterruptingClock(), Heads()
     units = dict(three_units(heads))
     list(units.values())[left_on // 4].receive(f"o {left_on % 4} 1\n".encode())
-    driver = ThorlabsLedBank("COM7", nine(), Units(clock, units))
+    driver = ThorlabsLeds("COM7", nine(), Units(clock, units))
     assert not any(heads.lit.values())
     with clock.interrupted_after(waits):
         for number in sequence:
@@ -254,14 +255,14 @@ def test_a_unit_that_is_missing_leaves_no_light_on_the_others() -> None:
     next(iter(units.values())).receive(b"o 2 1\n")
     assert heads.lit[2]
     with pytest.raises(KeyError, match="COM10"):
-        ThorlabsLedBank("COM7", nine(), Units(clock, units))
+        ThorlabsLeds("COM7", nine(), Units(clock, units))
     assert not any(heads.lit.values())
 
 
 def test_an_output_that_stays_on_does_not_keep_the_others_lit() -> None:
     stays_on = [*told("o 1 0"), *asked("o? 1", "1"), *SYNC]
     driver, port = bank([*OPENED, *SYNC, *off(0), *stays_on, *off(2), *off(3)])
-    with pytest.raises(UnclearAnswerError, match=r"output 2 .* reads on; switch it off by hand"):
+    with pytest.raises(UnclearAnswerError, match=r"output 2 .* reads on; switch off by hand"):
         driver.make_safe()
     assert port.script == []
 
@@ -280,8 +281,8 @@ def test_the_limit_of_current_is_that_of_the_output_that_is_lit() -> None:
 def test_a_missing_head_is_told_and_the_others_go_on() -> None:
     clock, heads = VirtualClock(), Heads()
     unit = Dc4100Board(heads, {0: 455.0})
-    driver = ThorlabsLedBank(
-        "COM7", ThorlabsLedBank.Settings.model_validate({"channels": CHANNELS}),
+    driver = ThorlabsLeds(
+        "COM7", ThorlabsLeds.Settings.model_validate({"channels": CHANNELS}),
         Units(clock, {"COM7": unit}),
     )  # fmt: skip
     with pytest.raises(DeviceError, match=r"output 4 .* no LED head is connected"):
@@ -314,4 +315,4 @@ def test_a_unit_that_is_gone_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 )  # fmt: skip
 def test_each_led_has_a_name_an_output_and_a_brightness(channels: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
-        ThorlabsLedBank.Settings.model_validate({"channels": channels})
+        ThorlabsLeds.Settings.model_validate({"channels": channels})

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy import optimize
 
-from labrig.fit.least_squares import EPSILON, LeastSquaresFit, least_squares
+from labrig.fit.nonlinear_least_squares import EPSILON, LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from tests.fit.fit_problems import Problem

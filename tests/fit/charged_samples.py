@@ -13,7 +13,7 @@ import numpy as np
 from labrig.foundation.arrays import FloatArray
 from labrig.material import Material, read_material
 from labrig.results import Charge, ChargingSeries, Transient
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import LampSettings

@@ -1,8 +1,7 @@
 """Layers that light is absorbed in."""
 
 from labrig.foundation.arrays import FloatArray
-from labrig.sim.kinetics import layers_of
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import KineticsSettings, layers_of
 from labrig.sim.lamp import Lamp
 from labrig.sim.phosphor import phosphor
 from tests.fit.charged_samples import Bench

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.fit import DecayFit, fit_decay, periodogram
-from labrig.fit.decay.periodic_flicker import unseen_flicker
+from labrig.fit.decay.diagnostics import unseen_flicker
 from labrig.foundation.arrays import FloatArray
 from labrig.protocols.steps.random_spacing import RandomSpacing
 

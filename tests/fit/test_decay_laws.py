@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from labrig.fit import DecayFit, fit_decay
 from labrig.fit.decay import laws
-from labrig.fit.decay.noise_likelihood import NoiseLikelihood
+from labrig.fit.decay.noise_correlation import NoiseLikelihood
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS, DecayLaw, exponential_means

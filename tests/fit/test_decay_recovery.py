@@ -5,10 +5,9 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from labrig.fit import DecayFit, fit_decay
-from labrig.fit.decay.joint import JointProblem, covariance_under_flicker, fit_jointly
-from labrig.fit.decay.series import decay_series
+from labrig.fit.decay.series import decay_series, whitened
 from labrig.fit.decay.states import exponentials
-from labrig.fit.decay.whitening import whitened
+from labrig.fit.decay.variable_projection import JointProblem, covariance_under_flicker, fit_jointly
 from labrig.foundation.arrays import FloatArray
 from tests.fit import truths
 from tests.pulls import assert_sigma_is_right

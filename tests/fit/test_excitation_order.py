@@ -16,7 +16,7 @@ from labrig.protocols.excitation.analysis.orders import OrderFits
 from labrig.protocols.excitation.options import ExcitationOptions
 from labrig.protocols.excitation.result import PatchCharging
 from labrig.results import Charge, ChargingSeries, Closure, EarlierCharges, FittedExcitation, Series
-from labrig.sim.kinetics_settings import KineticsSettings
+from labrig.sim.kinetics import KineticsSettings
 from labrig.sim.simulation import LampSettings
 from tests.fit.charged_samples import BARE, LVF, Bench, lvf_windows, two_states
 from tests.results.made import decay_result

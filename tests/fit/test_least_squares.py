@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.fit.least_squares import Ending, least_squares
+from labrig.fit.nonlinear_least_squares import Ending, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from tests.fit import strd

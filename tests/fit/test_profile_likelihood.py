@@ -8,14 +8,15 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from scipy.special import ndtr, ndtri
 
-from labrig.fit.bounded_limits import away_from_bound, toward_bound
-from labrig.fit.least_squares import Residuals
+from labrig.fit.nonlinear_least_squares import Residuals
 from labrig.fit.profile_likelihood import (
     Likelihood,
     LowerMinimumError,
     NoiseScale,
     Quantity,
+    away_from_bound,
     parameter,
+    toward_bound,
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.results import NORMAL_95, ProfileInterval

@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
-from labrig.fit.propagation import propagated_covariance
+from labrig.fit.nonlinear_least_squares import propagated_covariance
 
 
 @settings(max_examples=30)

@@ -110,7 +110,7 @@ def test_names_of_a_rig_stay_and_its_files_are_found(
     make_rig: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Folders called as the driver, the lamp and an answer of the board; another working folder."""
-    for there in ("numato_relay", "halogen_3000k", "ok/1", "canon_eos_5d_mark_ii", "blue-paint"):
+    for there in ("numato", "halogen_3000k", "ok/1", "canon_eos_5d_mark_ii", "blue-paint"):
         (tmp_path / there).mkdir(parents=True)
     material = tmp_path / "paint.yaml"
     shipped = Path(labrig.__file__).parent.resolve() / "config/materials/blue-paint.yaml"
@@ -123,7 +123,7 @@ def test_names_of_a_rig_stay_and_its_files_are_found(
         "camera_file": "run-3",
     }  # fmt: skip
     content["devices"]["leds"] = {
-        "driver": "serial_led_bank", "address": "sim://room/arduino",
+        "driver": "serial_relay", "address": "sim://room/arduino",
         "channels": {"a.csv": {"on": "ok/1", "off": "off", "spectrum": "a.csv"}},
     }  # fmt: skip
     path.write_text(yaml.safe_dump(content), encoding="utf-8")

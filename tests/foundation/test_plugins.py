@@ -53,7 +53,7 @@ def test_a_plan_loads_no_fit_and_no_report() -> None:
     loaded = {line for line in done.stdout.splitlines() if line.startswith("labrig.")}
     assert "labrig.protocols.decay.protocol" in loaded
     parts = {name.split(".")[3] for name in loaded if name.startswith("labrig.protocols.decay.")}
-    assert parts == {"protocol", "registration"}
+    assert parts == {"protocol"}
     others = [name for name in loaded if name.startswith(("labrig.fit", "labrig.report"))]
     assert not others
 

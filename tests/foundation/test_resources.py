@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.drivers.numato import NumatoRelay
+from labrig.drivers.numato import Numato
 from labrig.foundation import plugins
 
 FOLDERS = ("drivers", "protocols", "sim", "config")
@@ -61,11 +61,11 @@ def test_a_users_own_modules_neither_replace_ours_nor_break_anything(
 
 
 def test_a_class_is_one_object_by_every_road() -> None:
-    (entry,) = entry_points(group=plugins.DRIVERS, name="numato_relay")
-    by_name = importlib.import_module("labrig.drivers.numato").NumatoRelay
-    by_rig_file = plugins.load(plugins.DRIVERS, "numato_relay", "test")
-    assert NumatoRelay is by_name is by_rig_file is entry.load()
-    assert NumatoRelay.__module__.startswith("labrig.drivers.numato")
+    (entry,) = entry_points(group=plugins.DRIVERS, name="numato")
+    by_name = importlib.import_module("labrig.drivers.numato").Numato
+    by_rig_file = plugins.load(plugins.DRIVERS, "numato", "test")
+    assert Numato is by_name is by_rig_file is entry.load()
+    assert Numato.__module__.startswith("labrig.drivers.numato")
 
 
 @pytest.mark.parametrize("folder", FOLDERS)

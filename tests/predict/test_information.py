@@ -8,7 +8,7 @@ from hypothesis import given, settings, strategies as st
 
 from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
-from labrig.predict.information import information
+from labrig.predict.expectation import information
 from labrig.predict.patch import chance_of_all_states
 from labrig.predict.series import DARK, FLICKER, PHOTONS, READING, ExpectedSeries
 from tests.fit import truths

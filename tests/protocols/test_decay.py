@@ -78,7 +78,7 @@ def test_a_plan_for_a_driver_of_another_kind_is_refused(
     make_protocol: Callable[..., Path], make_rig: Callable[..., Path]
 ) -> None:
     rig = make_rig()
-    rig.write_text(rig.read_text().replace("ptp_camera", "numato_relay"))
+    rig.write_text(rig.read_text().replace("ptp_camera", "numato"))
     with pytest.raises(UsageError, match="is no camera"):
         plan(read_protocol(make_protocol()), read_rig_file(rig), str(rig))
 

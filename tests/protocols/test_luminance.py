@@ -26,7 +26,7 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
 
 def test_with_a_trap_door_the_card_comes_last(tmp_path: Path) -> None:
     content = read_quickly(write_rig(tmp_path).read_text())
-    servo = {"driver": "maestro_door", "address": "sim://room/servo", "channel": 0,
+    servo = {"driver": "maestro", "address": "sim://room/servo", "channel": 0,
              "closed": "1000 us", "open": "2000 us", "travel": "300 ms"}  # fmt: skip
     content["devices"]["door"] = servo
     (tmp_path / "rig.yaml").write_text(write_quickly(content))

@@ -136,7 +136,7 @@ def test_a_changer_that_says_nothing_of_darkness_shares_no_rests(tmp_path: Path)
 
 
 def test_what_was_decided_is_written_and_reads_back(tmp_path: Path) -> None:
-    protocol: Any = read_protocol(written(tmp_path, **CHAIN)).suited_to(rig_of(tmp_path))
+    protocol: Any = read_protocol(written(tmp_path, **CHAIN)).resolved_for(rig_of(tmp_path))
     assert (protocol.rests, protocol.sample.name) == ("shared", f"{BLUE}, {GREEN}")
     again = written(tmp_path, **protocol.model_dump(mode="json", by_alias=True))
     assert read_protocol(again) == protocol

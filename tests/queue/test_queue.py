@@ -208,7 +208,7 @@ def test_a_sample_changer_brings_the_samples_that_it_has(
     rig, _ = make_rig(), make_protocol()
     content = read_quickly(rig.read_text())
     content["devices"]["sample_changer"] = {
-        "driver": "maestro_sample_changer", "address": "sim://room/servo", "channel": 5,
+        "driver": "maestro", "address": "sim://room/servo", "channel": 5,
         "travel": "1 s", "away": "1000 us", "samples": {"red": "1300 us", "blue": "1600 us"},
     }  # fmt: skip
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}

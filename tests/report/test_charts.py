@@ -20,8 +20,7 @@ from labrig.report.chart import (
 )
 from labrig.report.chart_figure import chart_figure
 from labrig.report.chart_svg import TOLERANCE_PT, svg_body, text_width
-from labrig.report.figure_style import MARKERS, figure_style
-from labrig.report.ticks import decade_ticks, linear_ticks
+from labrig.report.figure_style import MARKERS, decade_ticks, figure_style, linear_ticks
 
 NUMBERS = st.floats(-1e6, 1e6)
 MARGINS = Margins(left=20.0, bottom=30.0, right=10.0, top=5.0)

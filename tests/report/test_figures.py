@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit
-from labrig.protocols.decay.report.periodogram_figure import (
+from labrig.protocols.decay.report.figures import (
     periodogram_figure,
+    residual_figure,
     residual_periodogram,
+    residuals,
 )
-from labrig.protocols.decay.report.residual_figures import residual_figure, residuals
 from labrig.report.chart import Chart, Points
 from labrig.report.chart_figure import chart_figure
 from labrig.report.decay_figures import (

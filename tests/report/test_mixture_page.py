@@ -20,7 +20,7 @@ from labrig.process import report_mixture
 from labrig.report import FittedMatrix, Section, mixture_report
 from labrig.report.chart import Chart, ErrorBars, Line, Points
 from labrig.report.mixture_figures import noise_floor
-from labrig.report.reradiation_spectra import emission_spectra, excitation_spectra
+from labrig.report.reradiation_figures import emission_spectra, excitation_spectra
 from tests.material.reradiation.synthetic import ORANGE, YELLOW, measurement
 from tests.report.about import ABOUT
 

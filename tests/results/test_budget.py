@@ -11,7 +11,7 @@ from labrig.fit import fit_luminance
 from labrig.foundation import plugins
 from labrig.protocols.fade.result import FittedShape, LampChange, SwitchedFrames
 from labrig.protocols.isotropy.result import AngularGlow, IsotropyResult
-from labrig.report.budgets import budget_lines
+from labrig.report.run_sections import budget_lines
 from labrig.results import Budget, DensityBasis, LayerEffect, LuminanceDecay, Measured, RunResult
 from tests.results.made_excitation import excitation_result
 

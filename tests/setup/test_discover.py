@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import usb.core
 
-from labrig.acquire import Program, linux_programs
+from labrig.acquire import Program, linux_programs, load_driver
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.drivers.ptp import PtpCamera
 from labrig.foundation import plugins
@@ -19,7 +19,7 @@ from labrig.sim import open_room
 from labrig.sim.camera import SimulatedCamera
 from tests.quick_yaml import read_quickly
 
-DRIVERS = ("numato_relay", "ptp_camera")
+DRIVERS = ("numato", "ptp_camera")
 
 
 @dataclass
@@ -111,9 +111,9 @@ def test_serial_ports_are_reported_by_their_usb_numbers(
 @pytest.mark.parametrize(
     ("ids", "driver", "role", "hint"),
     [
-        ((0x1A86, 0x7523), "lcus_relay", "lamp", "only if it is an LCUS board"),
-        ((0x1FFB, 0x0089), "maestro_door", "door", "usually the lower one"),
-        ((0x1FFB, 0x008C), "maestro_door", "door", "USB Dual Port"),
+        ((0x1A86, 0x7523), "lcus", "lamp", "only if it is an LCUS board"),
+        ((0x1FFB, 0x0089), "maestro", "door", "usually the lower one"),
+        ((0x1FFB, 0x008C), "maestro", "door", "USB Dual Port"),
         ((0x2341, 0x0043), "serial_relay", "lamp", "commands of the sketch"),
         ((0x1313, 0x8066), "thorlabs_dc4100", "leds", "the output to which it is connected"),
         ((0x0403, 0x6001), "serial_relay", "lamp", "write its own commands"),
@@ -139,14 +139,14 @@ def test_a_board_has_the_line_of_its_driver(
     assert (line[role]["driver"], line[role]["address"]) == (driver, "COM5")
     assert hint in found.hints[0]
     settings = {key: line[role][key] for key in line[role] if key not in DeviceEntry.model_fields}
-    plugins.load(plugins.DRIVERS, driver, "a test").Settings.model_validate(settings)
+    load_driver(role, driver, "a test").Settings.model_validate(settings)
 
 
 def test_snippets_are_yaml_that_names_driver_and_address() -> None:
     found = discover(pc([Plugged("COM4", "USB", 0x2A19, 0x0C05)], cameras()), DRIVERS)
     devices = read_quickly("\n".join(d.snippet for d in (*found.ports, *found.cameras)))
     assert devices["lamp"] == {
-        "driver": "numato_relay", "address": "COM4", "relay": 0, "warm_up": "15 min",
+        "driver": "numato", "address": "COM4", "relay": 0, "warm_up": "15 min",
     }  # fmt: skip
     assert devices["camera"]["driver"] == "ptp_camera"
     assert devices["camera"]["address"] == "usb://04a9:3199"

@@ -21,8 +21,7 @@ from labrig.foundation.errors import DeviceError, UsageError
 from labrig.foundation.region import CENTRE
 from labrig.local_server import KINDS
 from labrig.setup.picture_stats import decode, picture_stats, sharpness
-from labrig.setup.view import serve_pictures
-from labrig.setup.view_server import PAGES, EditableProtocol, LivePictures, ViewServer
+from labrig.setup.view import PAGES, EditableProtocol, LivePictures, ViewServer, serve_pictures
 from tests.conftest import Ended
 
 BLUE = {"patches": [{"name": "blue paint", "region": [0.1, 0.2, 0.3, 0.4]}]}

@@ -16,8 +16,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 from labrig.acquire import CAMERA, LiveView, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.foundation.clock import Interrupted
-from labrig.setup.view import serve_pictures
-from labrig.setup.view_server import EditableProtocol, LivePictures, ViewServer
+from labrig.setup.view import EditableProtocol, LivePictures, ViewServer, serve_pictures
 
 #: Where screenshots are kept for a person to look at.
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")

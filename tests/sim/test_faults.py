@@ -12,8 +12,8 @@ import serial
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.output_file import REAL_DISK
 from labrig.sim import OpenRoom, open_room
-from labrig.sim.disk import SimulatedDisk
 from labrig.sim.faults import AfterBytes, Slowness
+from labrig.sim.pc import SimulatedDisk
 
 
 @contextmanager

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from labrig.sim.bench_settings import IlluminantSettings
-from labrig.sim.illuminants import Illuminants, illuminant_spectrum
 from labrig.sim.lamp import BURNING_LIGHT, CELL_NM, WAVELENGTH_NM
+from labrig.sim.lamps import Illuminants, illuminant_spectrum
 
 KINDS = ("halogen", "xenon", "daylight", "ultraviolet")
 LAMPS = tuple(

@@ -10,7 +10,7 @@ from labrig.sim.arrangement import Arrangement
 from labrig.sim.bench_settings import ImagingSettings, LvfSettings, StripSettings
 from labrig.sim.imaging import Imaging
 from labrig.sim.lamp import C2_NM_K, WAVELENGTH_NM, Lamp
-from labrig.sim.lvf import PIECES, Lvf
+from labrig.sim.layout import PIECES, Lvf
 from labrig.sim.sensor import BLACK_DN, Sensor, gain_electrons_per_dn
 from labrig.sim.simulation import LampSettings
 from labrig.sim.wander import ZERO_S, Ripple, Wander

@@ -16,14 +16,16 @@ from labrig.sim.lamp import (
     BURNING_LIGHT,
     CELL_NM,
     IS_VISIBLE,
+    LINES,
     SETTLED_S,
     WAVELENGTH_NM,
     Lamp,
+    Mercury,
     filament_spectrum,
+    line_spectrum,
 )
 from labrig.sim.lamps import FilteredLamps
 from labrig.sim.lights import Lights, leak
-from labrig.sim.mercury import LINES, Mercury, line_spectrum
 from labrig.sim.simulation import LampSettings
 from tests.sim.darkroom import Darkroom
 

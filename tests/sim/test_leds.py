@@ -8,10 +8,9 @@ import pytest
 from labrig.foundation.errors import UsageError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.bench_settings import LedSettings
-from labrig.sim.lamp import BURNING_LIGHT, WAVELENGTH_NM, Lamp
+from labrig.sim.lamp import BURNING_LIGHT, WAVELENGTH_NM, Lamp, Mercury
 from labrig.sim.lamps import FilteredLamps
 from labrig.sim.leds import Leds, led_spectrum
-from labrig.sim.mercury import Mercury
 from labrig.sim.simulation import LampSettings, Simulation
 from tests.sim.darkroom import Darkroom
 

@@ -5,8 +5,7 @@ import pytest
 
 from labrig.optics import photopic_efficacy
 from labrig.sim.lamp import BURNING_SPECTRUM, WAVELENGTH_NM
-from labrig.sim.luminance import PHOTOPIC, luminance_mcd_per_m2
-from labrig.sim.optics import REFLECTED
+from labrig.sim.optics import PHOTOPIC, REFLECTED, luminance_mcd_per_m2
 from labrig.sim.simulation import LampSettings
 from tests.sim.darkroom import Darkroom
 

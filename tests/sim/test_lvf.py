@@ -10,7 +10,7 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.yaml_file import validate
 from labrig.sim.bench_settings import LvfSettings, StripSettings
 from labrig.sim.lamp import WAVELENGTH_NM
-from labrig.sim.lvf import PIECES, Lvf, pieces
+from labrig.sim.layout import PIECES, Lvf, pieces
 from labrig.sim.simulation import Simulation
 from tests.sim.darkroom import DOOR, LVF, SMALL, STRIP, Darkroom, colours, columns, mosaic
 

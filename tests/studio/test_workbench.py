@@ -12,9 +12,8 @@ from hypothesis import given, strategies as st
 from labrig.design import Parameters, read_wish, to_wish, written_differences
 from labrig.foundation.errors import UsageError
 from labrig.material import read_material
-from labrig.studio.messages import Asked, wish_content
+from labrig.studio.messages import Asked, timeline_of, wish_content
 from labrig.studio.server import StudioServer
-from labrig.studio.timeline import timeline_of
 from labrig.studio.workbench import Workbench
 
 KEYS = [

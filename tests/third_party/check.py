@@ -17,7 +17,7 @@ assert isinstance(result, LampDriftResult)
 assert len(result.time_s) == 12
 assert abs(result.drift.value) < 1e-3, result.drift
 assert result.change_sigmas is None
-assert "plain relay 0" in (first / "result" / "report.html").read_text(encoding="utf-8")
+assert "plain board, relay 0" in (first / "result" / "report.html").read_text(encoding="utf-8")
 assert DRIFT_KIND.read(first).drift_per_s == result.drift.value
 later = labrig.read_result(second)
 assert isinstance(later, LampDriftResult)

@@ -13,7 +13,7 @@ from ..session import CURT, Session
 from ..settings import PtpCameraSettings
 from .checks import findings
 from .exposure import EosExposure
-from .frames import EosFrames
+from .frames import EosFrames, EosTransfer
 from .protocol import (
     FEW_SHOTS,
     HOST_ROOM,
@@ -26,7 +26,6 @@ from .protocol import (
 )
 from .shutter import EosShutter
 from .state import EosState
-from .transfer import EosTransfer
 from .viewfinder import EosViewfinder
 
 

@@ -1,4 +1,4 @@
-"""The frames of an EOS: the one that is due, its fetching, and abandoned ones."""
+"""The frames of an EOS: the one that is due, its transfer, and abandoned ones."""
 
 import math
 import re
@@ -6,16 +6,56 @@ import re
 from labrig.foundation.clock import Clock
 from labrig.foundation.errors import DeviceError
 
+from ..codes import INVALID_OBJECT_HANDLE, Standard
+from ..device_info import DeviceInfo
 from ..failures import RefusedError
-from ..session import USUAL
+from ..object_transfer import PATIENT, ObjectTransfer
+from ..session import USUAL, Session
 from .events import ObjectOffered
+from .protocol import Eos
 from .state import POLL_PERIOD_S, EosState
-from .transfer import EosTransfer
 
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,5}")
 _JPEG_FORMAT = 0x3801
 #: Time after which a frame of a dead program's exposure is no longer offered.
 LEFT_OVER_S = 2.0
+
+
+_IN_PARTS: tuple[Eos | Standard, ...] = (Eos.GetPartialObject, Standard.GetPartialObject)
+
+
+class EosTransfer:
+    """Transfer of the files that the camera offers."""
+
+    def __init__(self, session: Session, clock: Clock, info: DeviceInfo) -> None:
+        self._session = session
+        part = next((op for op in _IN_PARTS if op in info.operations), None)
+        self._objects = ObjectTransfer(session, clock, Eos.GetObject, part)
+
+    def fetch(self, offered: ObjectOffered) -> bytes:
+        """Return the file's bytes.
+
+        Raises
+        ------
+        DeviceError
+            The camera sends more or fewer bytes than it announced, or fails to send.
+        """
+        return self._objects.fetch(offered.handle, offered.name, offered.size_bytes)
+
+    def complete(self, offered: ObjectOffered) -> None:
+        """Confirm the transfer, so that the camera may delete the file.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not take the confirmation.
+        """
+        try:
+            self._session.transact(Eos.TransferComplete, offered.handle, timeouts=PATIENT)
+        except RefusedError as refusal:
+            # it has forgotten it: it heard an earlier attempt, whose answer was lost
+            if refusal.code != INVALID_OBJECT_HANDLE:
+                raise
 
 
 class EosFrames:

@@ -1,6 +1,7 @@
 """A PTP camera without a maker's extension: the abilities of PIMA 15740 itself."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
+from enum import IntEnum
 
 from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
 from labrig.foundation.clock import Clock
@@ -24,9 +25,12 @@ FOCUS_S = 12.0
 #: An answer later than this and than the exposure's end comes when the shutter has closed.
 PROMPT_S = 0.25
 
-NEEDED = frozenset(
+#: Operations that release the shutter, each with its parameters; a camera is released by the first
+#: one that it has. One of a maker's own is a line here.
+RELEASES: tuple[tuple[IntEnum, tuple[int, ...]], ...] = ((Standard.InitiateCapture, (0, 0)),)
+
+_NEEDED = frozenset(
     {
-        Standard.InitiateCapture,
         Standard.GetObjectInfo,
         Standard.GetObject,
         Standard.GetDevicePropDesc,
@@ -36,8 +40,16 @@ NEEDED = frozenset(
 )
 
 
+def missing_operations(operations: Collection[int]) -> list[str]:
+    """Return the operations that a camera lacks for being released by labrig."""
+    missing = [f"0x{op:X}" for op in sorted(_NEEDED.difference(operations))]
+    if all(release not in operations for release, _ in RELEASES):
+        missing.append(" or ".join(f"0x{release:X}" for release, _ in RELEASES))
+    return missing
+
+
 class StandardCamera:
-    """Any camera that releases by InitiateCapture, in an open session.
+    """Any camera that releases by one of `RELEASES`, in an open session.
 
     Its frames go to its own card; each is deleted there when the next one is prepared. A frame
     whose `shoot` was broken off is discarded before the next.
@@ -62,6 +74,9 @@ class StandardCamera:
         self._info = info
         self._settings = settings
         self._in_force: ExposureSettings | None = None
+        self._release_operation, self._release_params = next(
+            release for release in RELEASES if release[0] in info.operations
+        )
         self._properties = StandardProperties(
             session, clock, info.properties, settings.answer_timeout
         )
@@ -151,7 +166,7 @@ class StandardCamera:
     def shoot(self) -> Frame:
         """Release now, wait for the exposure, transfer the frame.
 
-        The exposure begins within the round trip of InitiateCapture, in its middle as far as is
+        The exposure begins within the round trip of the release, in its middle as far as is
         known, plus the measured `shutter_lag`; the standard offers nothing better.
 
         Raises
@@ -201,7 +216,9 @@ class StandardCamera:
         self._frames.expect(self._clock.now() + LATE_RELEASE_S + exposure_s)
         timeouts = Timeouts(answer_s=exposure_s + FOCUS_S, busy_s=LATE_RELEASE_S)
         try:
-            reply = self._session.transact(Standard.InitiateCapture, 0, 0, timeouts=timeouts)
+            reply = self._session.transact(
+                self._release_operation, *self._release_params, timeouts=timeouts
+            )
         except RefusedError:
             self._frames.expect_none()
             raise

@@ -16,8 +16,7 @@ from ..failures import RefusedError
 from ..settings import PtpCameraSettings
 from .exposure import AUTO_ISO, FEWEST_UNITS, UNITS_PER_S
 from .object_info import can_be_raw
-from .properties import StandardProperties
-from .property_description import PropertyDescription
+from .properties import PropertyDescription, StandardProperties
 
 MANUAL_PROGRAM = 1
 #: A time told true lies so near to a power of two in thirds or halves of a stop, but for rounding;

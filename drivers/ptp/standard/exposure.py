@@ -12,8 +12,7 @@ from labrig.foundation.errors import DeviceError
 
 from ..codes import StandardProperty
 from ..settings import PtpCameraSettings
-from .properties import StandardProperties
-from .property_description import PropertyDescription
+from .properties import PropertyDescription, StandardProperties
 
 #: Units of ExposureTime per second.
 UNITS_PER_S = 10_000

@@ -8,6 +8,7 @@ need in `__all__`.
 
 from typing import Any
 
+from labrig.acquire.roles.board_device import BoardDevice
 from labrig.acquire.roles.camera import CAMERA, Camera, Shoot
 from labrig.acquire.roles.changer import CHANGER, Changer
 from labrig.acquire.roles.door_and_shield import (
@@ -17,34 +18,33 @@ from labrig.acquire.roles.door_and_shield import (
     SHIELD,
     SHIELD_COVER,
     SHIELD_UNCOVER,
-    Door,
-    LampShield,
-    Shield,
-    TrapDoor,
+    Swing,
+    SwingTo,
 )
 from labrig.acquire.roles.filter_wheel import (
     CAMERA_FILTER_WHEEL,
     FILTER_WHEEL,
-    FilterWheel,
     TurnCameraWheel,
     TurnWheel,
 )
-from labrig.acquire.roles.illuminants import (
+from labrig.acquire.roles.known_light import Illuminant, LedLight
+from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, LampSwitch
+from labrig.acquire.roles.light_bank import (
     ILLUMINANTS,
     ILLUMINANTS_OFF,
-    Illuminant,
+    LEDS,
+    LEDS_OFF,
     IlluminantSwitch,
-    LampBank,
+    LedSwitch,
+    LightBank,
 )
-from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
-from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedLight, LedSwitch
-from labrig.acquire.roles.light_bank import LightBank
 from labrig.acquire.roles.monochromator import (
     MONOCHROMATOR,
     Monochromator,
     MonochromatorBand,
     Tune,
 )
+from labrig.acquire.roles.places import Places
 from labrig.acquire.roles.role import (
     DARK,
     Checkable,
@@ -122,25 +122,22 @@ __all__ = [
     "SPECTROMETER",
     "THERMOMETER",
     "VIEWFINDER",
+    "BoardDevice",
     "BringSample",
     "Camera",
     "Changer",
     "Checkable",
     "Device",
     "DeviceAction",
-    "Door",
     "ExerciseContext",
     "Exercised",
-    "FilterWheel",
     "FrameReader",
     "Guarded",
     "Illuminant",
     "IlluminantSwitch",
     "KeptAwake",
     "Lamp",
-    "LampBank",
-    "LampShield",
-    "LedBank",
+    "LampSwitch",
     "LedLight",
     "LedSwitch",
     "Light",
@@ -149,17 +146,17 @@ __all__ = [
     "Measured",
     "Monochromator",
     "MonochromatorBand",
+    "Places",
     "PlannedDevice",
     "ReadSpectrum",
     "Role",
     "SampleChanger",
-    "Shield",
     "Shoot",
     "Spectrometer",
     "Suggestion",
-    "Switch",
+    "Swing",
+    "SwingTo",
     "Thermometer",
-    "TrapDoor",
     "Tune",
     "TurnCameraWheel",
     "TurnWheel",

@@ -185,6 +185,6 @@ CAMERA: Role[Camera] = Role(
     key="camera",
     protocol_class=Camera,
     name="camera",
-    planned=lambda driver, settings, clock: PlannedCamera(clock, driver.declared_offers(settings)),
+    planned=lambda settings, clock: PlannedCamera(clock, settings.planned_offers()),
     exercise=exercise_camera,
 )

@@ -1,9 +1,19 @@
-"""Devices that swing: the trap door below the sample and the shield before the lamp."""
+"""Parts that swing between two ends: the trap door below the sample and the shield before the lamp.
 
-from collections.abc import Callable, Mapping
+Both are one kind of device under two keys of a rig file. The safe end of the door is closed; that
+of the shield (Nalbach et al., section 4.4) is uncovered, since a hot lamp behind a shield cannot
+lose its heat.
+"""
+
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from functools import partial
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from pydantic import BaseModel, Field
+
+from labrig.acquire.channels import Board, Servo
+from labrig.acquire.connections import Connections
+from labrig.acquire.roles.board_device import BoardDevice, keys_model, require_distinct
 from labrig.acquire.roles.role import (
     Device,
     ExerciseContext,
@@ -16,140 +26,160 @@ from labrig.foundation.quantity import duration_text
 
 
 @runtime_checkable
-class TrapDoor(Device, Protocol):
-    """A door that swings the sample from the filter towards the camera. Safe state: closed."""
+class Swing(Device, Protocol):
+    """A part that swings between a safe end and another one, such as a trap door."""
 
-    def open(self) -> None:
-        """Begin to open the door; return when the command is acknowledged."""
-
-    def close(self) -> None:
-        """Begin to close the door; return when the command is acknowledged."""
+    def swing(self, *, safe: bool) -> None:
+        """Begin to swing to the safe end or to the other; return when it is acknowledged."""
 
     def travel_s(self) -> float:
-        """Return the time in seconds from the command until the door has stopped."""
-
-
-@runtime_checkable
-class LampShield(Device, Protocol):
-    """A shield that keeps the afterglow of the lamp from the sample (Nalbach et al., section 4.4).
-
-    Safe state: uncovered, since a hot lamp behind a shield cannot lose its heat.
-    """
-
-    def cover(self) -> None:
-        """Begin to cover the lamp; return when the command is acknowledged."""
-
-    def uncover(self) -> None:
-        """Begin to uncover the lamp; return when the command is acknowledged."""
-
-    def travel_s(self) -> float:
-        """Return the time in seconds from the command until the shield has stopped."""
+        """Return the time in seconds from the command until the part has stopped."""
 
 
 class PlannedSwing(PlannedDevice):
-    """Stand-in of a trap door or shield in a plan; protocols wait for its travel themselves."""
+    """Stand-in of a part that swings in a plan; protocols wait for its travel themselves."""
 
     def __init__(self, travel_s: float) -> None:
         self._travel_s = travel_s
 
     def travel_s(self) -> float:
-        """Return the travel time in seconds that the driver declares."""
+        """Return the travel time in seconds in the rig file."""
         return self._travel_s
 
-    def open(self) -> None:
+    def swing(self, *, safe: bool) -> None:
         """Do nothing."""
 
-    def close(self) -> None:
-        """Do nothing."""
 
-    def cover(self) -> None:
-        """Do nothing."""
+class ServoSwing(BoardDevice):
+    """A part of the bench that a servo swings.
 
-    def uncover(self) -> None:
-        """Do nothing."""
+    The read-back is the command that the board sends, not the place of the part: one that is
+    stuck, or a servo without power, is seen by the camera alone.
+    """
+
+    kind = Servo
+    #: Keys of the safe end and of the other one in a rig file, and their descriptions.
+    ends: ClassVar[tuple[tuple[str, str], tuple[str, str]]]
+
+    def __init__(self, address: str, settings: Any, connections: Connections) -> None:
+        super().__init__(address, settings, connections)
+        self._servo: Servo = self.channel_class(self.board, settings)
+        self._safe, self._other = (getattr(settings, key) for key, _ in self.ends)
+
+    @classmethod
+    def keys(cls, board: type[Board], channel: type[Servo]) -> type[BaseModel]:
+        """Return the model of the device's keys: a position for each end, and those of a servo."""
+        (safe, _), (other, _) = cls.ends
+
+        def differ(settings: Any) -> None:
+            positions = [channel.distinct(getattr(settings, key)) for key in (safe, other)]
+            require_distinct(positions, f"two different positions for '{safe}' and '{other}'")
+
+        ends = {key: (channel.Position, Field(description=text)) for key, text in cls.ends}
+        return keys_model(cls, (channel.Settings, board.Settings), differ, **ends)
+
+    def identity(self) -> str:
+        """Return the board's identity, the channel and the position that is commanded."""
+        return f"{self.board.identity()}, {self.noun} on {self._servo.place()}"
+
+    def travel_s(self) -> float:
+        """Return the time in seconds from the command until it has stopped, from the rig file."""
+        travel_s: float = self.settings.travel
+        return travel_s
+
+    def swing(self, *, safe: bool) -> None:
+        """Begin to swing to the safe end or to the other; return when it is acknowledged."""
+        self._servo.go(self._safe if safe else self._other)
+
+    def make_safe(self) -> None:
+        """Swing to the safe end, whatever was interrupted; return when it has had the time."""
+        self._servo.make_safe(self._safe)
+
+
+class ServoDoor(ServoSwing):
+    """A trap door that a servo swings."""
+
+    noun = "trap door"
+    ends = (
+        ("closed", "Position of the servo with the door closed, for example `1000 us`."),
+        ("open", "Position of the servo with the door open, for example `2000 us`."),
+    )
+
+
+class ServoShield(ServoSwing):
+    """A shield that a servo swings before the lamp."""
+
+    noun = "lamp shield"
+    ends = (
+        (
+            "uncovering",
+            "Position of the servo with the shield away from the lamp, its safe end, for example "
+            "`2000 us`.",
+        ),
+        (
+            "covering",
+            "Position of the servo with the shield before the lamp, for example `1000 us`.",
+        ),
+    )
 
 
 @dataclass(frozen=True)
-class Door:
-    """The action that opens or closes the trap door."""
+class SwingTo:
+    """The action that swings a part to one of its ends.
 
-    open: bool
-    device: ClassVar[str] = "door"
+    Attributes
+    ----------
+    device
+        Key of the role.
+    end
+        Name of the movement in the journal.
+    safe
+        Whether it leads to the safe end.
+    """
 
-    def __str__(self) -> str:
-        return "open" if self.open else "close"
-
-    def begin(self, door: TrapDoor) -> None:
-        """Begin the movement, which ends `TrapDoor.travel_s` later."""
-        if self.open:
-            door.open()
-        else:
-            door.close()
-
-
-@dataclass(frozen=True)
-class Shield:
-    """The action that covers or uncovers the lamp."""
-
-    cover: bool
-    device: ClassVar[str] = "shield"
+    device: str
+    end: str
+    safe: bool
 
     def __str__(self) -> str:
-        return "cover" if self.cover else "uncover"
+        return self.end
 
-    def begin(self, shield: LampShield) -> None:
-        """Begin the movement, which ends `LampShield.travel_s` later."""
-        if self.cover:
-            shield.cover()
-        else:
-            shield.uncover()
+    def begin(self, part: Swing) -> None:
+        """Begin the movement, which ends `Swing.travel_s` later."""
+        part.swing(safe=self.safe)
 
 
-DOOR_OPEN = Door(open=True)
-DOOR_CLOSE = Door(open=False)
-SHIELD_COVER = Shield(cover=True)
-SHIELD_UNCOVER = Shield(cover=False)
+DOOR_OPEN = SwingTo("door", "open", safe=False)
+DOOR_CLOSE = SwingTo("door", "close", safe=True)
+SHIELD_COVER = SwingTo("shield", "cover", safe=False)
+SHIELD_UNCOVER = SwingTo("shield", "uncover", safe=True)
 
 
-def _swing(
-    moves: Mapping[str, Callable[[], None]], travel_s: float, context: ExerciseContext
-) -> Exercised:
-    """Move a device once in each way, over its full travel; the last way is the safe one."""
+def _exercise(part: Swing, context: ExerciseContext, *, there: SwingTo, back: SwingTo) -> Exercised:
+    """Move a part once to each end, over its full travel; the last one is the safe one."""
     measured = []
-    for name, move in moves.items():
-        measured.append(Measured(name, f"{context.timed_s(move) * 1e3:.1f} ms"))
-        context.clock.sleep(travel_s)
+    for move in (there, back):
+        moved_s = context.timed_s(partial(move.begin, part))
+        measured.append(Measured(f"{move}, read back", f"{moved_s * 1e3:.1f} ms"))
+        context.clock.sleep(part.travel_s())
     travelled = Measured(
         "travel, from the rig file",
-        f"{duration_text(travel_s)}; watch that it has stopped by then: no board sees that",
+        f"{duration_text(part.travel_s())}; watch that it has stopped by then: no board sees that",
     )
     return Exercised((*measured, travelled))
 
 
-def _exercise_door(door: TrapDoor, context: ExerciseContext) -> Exercised:
-    moves = {"open, read back": door.open, "close, read back": door.close}
-    return _swing(moves, door.travel_s(), context)
+def _role(there: SwingTo, back: SwingTo, on_board: type[ServoSwing]) -> Role[Swing]:
+    return Role(
+        key=there.device,
+        protocol_class=Swing,
+        name=there.device,
+        planned=lambda settings, clock: PlannedSwing(settings.travel),
+        on_board=on_board,
+        exercise=partial(_exercise, there=there, back=back),
+        safe_first=True,
+    )
 
 
-def _exercise_shield(shield: LampShield, context: ExerciseContext) -> Exercised:
-    moves = {"cover, read back": shield.cover, "uncover, read back": shield.uncover}
-    return _swing(moves, shield.travel_s(), context)
-
-
-DOOR: Role[TrapDoor] = Role(
-    key="door",
-    protocol_class=TrapDoor,
-    name="door",
-    planned=lambda driver, settings, clock: PlannedSwing(driver.declared_travel_s(settings)),
-    exercise=_exercise_door,
-    safe_first=True,
-)
-
-SHIELD: Role[LampShield] = Role(
-    key="shield",
-    protocol_class=LampShield,
-    name="shield",
-    planned=lambda driver, settings, clock: PlannedSwing(driver.declared_travel_s(settings)),
-    exercise=_exercise_shield,
-    safe_first=True,
-)
+DOOR = _role(DOOR_OPEN, DOOR_CLOSE, ServoDoor)
+SHIELD = _role(SHIELD_COVER, SHIELD_UNCOVER, ServoShield)

@@ -1,62 +1,25 @@
 """Filter wheels, which put one of their filters before the lamp, or before the camera."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar
 
-from labrig.acquire.roles.role import (
-    Device,
-    ExerciseContext,
-    Exercised,
-    Measured,
-    PlannedDevice,
-    Role,
-)
-from labrig.foundation.clock import VirtualClock
+from labrig.acquire.roles.places import BoardPlaces, Places, PlannedPlaces, timed
+from labrig.acquire.roles.role import ExerciseContext, Exercised, Role
 from labrig.foundation.errors import ProtocolError
-from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
 
 
-@runtime_checkable
-class FilterWheel(Device, Protocol):
-    """A wheel, or a slide, with filters and an open slot. Safe state: at rest.
+class BoardFilterWheel(BoardPlaces):
+    """Filters on an arm, a slide or a wheel that a channel of a board moves."""
 
-    A filter that is in the wheel is put in place by it; all others, by hand.
-    """
-
-    def filters(self) -> tuple[str, ...]:
-        """Return the names of the filters in the wheel."""
-
-    def put(self, name: str | None, /) -> None:
-        """Turn to a filter, or to the open slot for None; return when it is in place.
-
-        Raises
-        ------
-        DeviceError
-            The wheel does not confirm that it is there.
-        """
-
-
-class PlannedFilterWheel(PlannedDevice):
-    """Stand-in of a filter wheel in a plan, for which every turn takes the longest time."""
-
-    def __init__(self, clock: VirtualClock, filters: Sequence[str], turn_s: float) -> None:
-        self._clock = clock
-        self._filters = tuple(filters)
-        self._turn_s = turn_s
-        self._name: str | None = None
-
-    def filters(self) -> tuple[str, ...]:
-        """Return the filters that the driver declares."""
-        return self._filters
-
-    def put(self, name: str | None, /) -> None:
-        """Let the time of a turn pass, unless the filter is in place."""
-        if name != self._name:
-            self._clock.spend(self._turn_s)
-        self._name = name
+    noun = "filter wheel"
+    things = (
+        "filters",
+        "Position with each filter in place, by the filter's name, for example "
+        "`{bandpass-450: 1100 us, bandpass-500: 1300 us}` on a servo, "
+        "`{bandpass-450: 2, bandpass-500: 3}` for the slots of a wheel.",
+    )
+    empty = ("open", "Position with no filter in place.")
 
 
 @dataclass(frozen=True)
@@ -70,7 +33,7 @@ class TurnWheel:
     def __str__(self) -> str:
         return f"filter {self.filter}" if self.filter else "no filter"
 
-    def begin(self, wheel: FilterWheel) -> None:
+    def begin(self, wheel: Places) -> None:
         """Turn the wheel, and wait until the filter is in place.
 
         Raises
@@ -78,10 +41,10 @@ class TurnWheel:
         ProtocolError
             The wheel has no such filter.
         """
-        if self.filter is not None and self.filter not in wheel.filters():
+        if self.filter is not None and self.filter not in wheel.names():
             raise ProtocolError(
                 f"the protocol puts the filter '{self.filter}' before the {self.before}, which the "
-                f"wheel has not; {did_you_mean(self.filter, wheel.filters())}"
+                f"wheel has not; {did_you_mean(self.filter, wheel.names())}"
             )
         wheel.put(self.filter)
 
@@ -94,24 +57,18 @@ class TurnCameraWheel(TurnWheel):
     before: ClassVar[str] = "camera"
 
 
-def _exercise(wheel: FilterWheel, context: ExerciseContext) -> Exercised:
+def _exercise(wheel: Places, context: ExerciseContext) -> Exercised:
     """Turn to every filter once, and back to the open slot."""
-    measured = [
-        Measured(f"to {name}", duration_text(context.timed_s(partial(wheel.put, name))))
-        for name in wheel.filters()
-    ]
-    back_s = context.timed_s(partial(wheel.put, None))
-    return Exercised((*measured, Measured("to the open slot", duration_text(back_s))))
+    return Exercised(tuple(timed(wheel, context, "to the open slot")))
 
 
-def _role(key: str, name: str) -> Role[FilterWheel]:
+def _role(key: str, name: str) -> Role[Places]:
     return Role(
         key=key,
-        protocol_class=FilterWheel,
+        protocol_class=Places,
         name=name,
-        planned=lambda driver, settings, clock: PlannedFilterWheel(
-            clock, driver.declared_filters(settings), driver.declared_turn_s(settings)
-        ),
+        planned=lambda settings, clock: PlannedPlaces(clock, settings.filters, settings.travel),
+        on_board=BoardFilterWheel,
         exercise=_exercise,
     )
 

@@ -1,12 +1,17 @@
 """The lamp, the light that charges the sample."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
+from labrig.acquire.channels import Switch
+from labrig.acquire.connections import Connections
+from labrig.acquire.roles.board_device import BoardDevice, read_back_findings
 from labrig.acquire.roles.role import (
     DARK,
     ExerciseContext,
     Exercised,
+    Finding,
     Light,
     Measured,
     PlannedDevice,
@@ -56,8 +61,47 @@ class PlannedLamp(PlannedDevice):
         return self._on
 
 
+class SwitchedLamp(BoardDevice):
+    """A lamp on one switch of a board."""
+
+    kind = Switch
+    noun = "lamp"
+
+    def __init__(self, address: str, settings: Any, connections: Connections) -> None:
+        super().__init__(address, settings, connections)
+        self._switch: Switch = self.channel_class(self.board, settings)
+
+    def identity(self) -> str:
+        """Return the board's identity, and the switch."""
+        return ", ".join(filter(None, (self.board.identity(), self._switch.place())))
+
+    def reads_back(self) -> bool:
+        """Return whether the board reports the switch's state."""
+        return self._switch.reads_back()
+
+    def findings(self) -> Sequence[Finding]:
+        """Return whether anything but the camera can verify that the lamp was switched."""
+        return read_back_findings([self._switch])
+
+    def on(self) -> None:
+        """Switch the lamp on, and read it back where the board can."""
+        self._switch.switch(on=True)
+
+    def off(self) -> None:
+        """Switch the lamp off, and read it back where the board can."""
+        self._switch.switch(on=False)
+
+    def is_on(self) -> bool:
+        """Return the state that the board reports, else the one commanded last."""
+        return self._switch.is_on()
+
+    def make_safe(self) -> None:
+        """Switch the lamp off, whatever was interrupted."""
+        self.board.make_safe([self._switch])
+
+
 @dataclass(frozen=True)
-class Switch:
+class LampSwitch:
     """The action that switches the lamp on or off."""
 
     on: bool
@@ -74,8 +118,8 @@ class Switch:
             lamp.off()
 
 
-LAMP_ON = Switch(on=True)
-LAMP_OFF = Switch(on=False)
+LAMP_ON = LampSwitch(on=True)
+LAMP_OFF = LampSwitch(on=False)
 
 
 def _exercise(lamp: Lamp, context: ExerciseContext) -> Exercised:
@@ -111,7 +155,8 @@ LAMP: Role[Lamp] = Role(
     key="lamp",
     protocol_class=Lamp,
     name="lamp",
-    planned=lambda driver, settings, clock: PlannedLamp(),
+    planned=lambda settings, clock: PlannedLamp(),
+    on_board=SwitchedLamp,
     exercise=_exercise,
     state=lambda lamp: str(LAMP_ON if lamp.is_on() else LAMP_OFF),
     safe_first=True,

@@ -139,8 +139,6 @@ MONOCHROMATOR: Role[Monochromator] = Role(
     key="monochromator",
     protocol_class=Monochromator,
     name="monochromator",
-    planned=lambda driver, settings, clock: PlannedMonochromator(
-        clock, driver.declared_band(settings)
-    ),
+    planned=lambda settings, clock: PlannedMonochromator(clock, settings),
     exercise=_exercise,
 )

@@ -2,10 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, Any, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
+from labrig.acquire.channels import Board
 from labrig.acquire.values import Frame
 from labrig.foundation.clock import Clock, VirtualClock
+
+if TYPE_CHECKING:
+    from labrig.acquire.roles.board_device import BoardDevice
 
 #: `refuse`: the setting spoils photometry. `warn`: it may. `fine`: it is correct.
 Severity = Literal["refuse", "warn", "fine"]
@@ -217,8 +221,10 @@ class Role(Generic[DeviceT]):
     name
         Name of its device in messages.
     planned
-        Factory of the stand-in in a plan, from the driver's class, its settings and the plan's
-        clock; None if a plan needs none. Drivers declare what it has to know by class methods.
+        Factory of the stand-in in a plan, from the device's settings and the plan's clock; None if
+        a plan needs none.
+    on_board
+        Class of its devices that are channels of a board; None if no board has such channels.
     exercise
         Function that exercises the device gently and leaves it safe in any case; None for no
         exercise.
@@ -232,10 +238,22 @@ class Role(Generic[DeviceT]):
     key: str
     protocol_class: type
     name: str
-    planned: Callable[[Any, Any, VirtualClock], DeviceT] | None = None
+    planned: Callable[[Any, VirtualClock], DeviceT] | None = None
+    on_board: "type[BoardDevice] | None" = None
     exercise: Callable[[DeviceT, ExerciseContext], Exercised] | None = None
     state: Callable[[DeviceT], str] | None = None
     safe_first: bool = False
+
+    def driver(self, registered: type) -> type[Any] | None:
+        """Return the class that fills the role with a registered driver, None if it cannot.
+
+        It is the driver itself, or the role's own device on the channels of the driver's board.
+        """
+        if issubclass(registered, self.protocol_class):
+            return registered
+        if self.on_board is not None and issubclass(registered, Board):
+            return self.on_board.for_board(registered)
+        return None
 
 
 class DeviceAction(Protocol):

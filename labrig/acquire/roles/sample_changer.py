@@ -1,70 +1,66 @@
 """The sample changer, which brings one of several samples into the light."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from labrig.acquire.roles.role import (
-    Device,
-    ExerciseContext,
-    Exercised,
-    Finding,
-    Measured,
-    PlannedDevice,
-    Role,
-)
+from pydantic import Field
+
+from labrig.acquire.roles.places import BoardPlaces, Places, PlannedPlaces, timed
+from labrig.acquire.roles.role import ExerciseContext, Exercised, Finding, Role
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import ProtocolError
-from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
 
 
 @runtime_checkable
-class SampleChanger(Device, Protocol):
-    """A disk or a slide with samples. Safe state: all of them in the dark."""
-
-    def samples(self) -> tuple[str, ...]:
-        """Return the names of the samples on it."""
+class SampleChanger(Places, Protocol):
+    """A disk or a slide with samples. Safe state: all of them in the dark, none in place."""
 
     def keeps_dark(self) -> bool:
         """Whether samples that are not in place lie in the dark while another one is lit."""
 
-    def put(self, name: str | None, /) -> None:
-        """Bring a sample into place, or all of them into the dark for None; return when done.
 
-        Raises
-        ------
-        DeviceError
-            The changer does not confirm it.
-        """
-
-
-class PlannedSampleChanger(PlannedDevice):
-    """Stand-in of a sample changer in a plan, for which every turn takes the longest time."""
+class PlannedSampleChanger(PlannedPlaces):
+    """Stand-in of a sample changer in a plan."""
 
     def __init__(
-        self, clock: VirtualClock, samples: Sequence[str], turn_s: float, *, keeps_dark: bool
+        self, clock: VirtualClock, samples: Sequence[str], travel_s: float, *, keeps_dark: bool
     ) -> None:
-        self._clock = clock
-        self._samples = tuple(samples)
-        self._turn_s = turn_s
+        super().__init__(clock, samples, travel_s)
         self._keeps_dark = keeps_dark
-        self._name: str | None = None
-
-    def samples(self) -> tuple[str, ...]:
-        """Return the samples that the driver declares."""
-        return self._samples
 
     def keeps_dark(self) -> bool:
         """Whether the rig file says that samples that are not in place lie in the dark."""
         return self._keeps_dark
 
-    def put(self, name: str | None, /) -> None:
-        """Let the time of a turn pass, unless the sample is in place."""
-        if name != self._name:
-            self._clock.spend(self._turn_s)
-        self._name = name
+
+class BoardSampleChanger(BoardPlaces):
+    """Samples on a disk or a slide that a channel of a board moves."""
+
+    noun = "sample changer"
+    things = (
+        "samples",
+        "Position with each sample in place, by the sample's name, for example "
+        "`{blue-paint: 1100 us, green-paint: 1300 us}` on a servo.",
+    )
+    empty = ("away", "Position with all samples in the dark.")
+    role_keys: ClassVar[Mapping[str, Any]] = {
+        "keeps_dark": (
+            bool,
+            Field(
+                False,
+                description="Whether samples that are not in place lie in the dark, light-tight, "
+                "while another one is lit and photographed. Only then may one rest while another "
+                "is measured.",
+            ),
+        )
+    }
+
+    def keeps_dark(self) -> bool:
+        """Whether samples that are not in place lie in the dark while another one is lit."""
+        keeps_dark: bool = self.settings.keeps_dark
+        return keeps_dark
 
 
 @dataclass(frozen=True)
@@ -85,21 +81,17 @@ class BringSample:
         ProtocolError
             The changer has no such sample.
         """
-        if self.sample is not None and self.sample not in changer.samples():
+        if self.sample is not None and self.sample not in changer.names():
             raise ProtocolError(
                 f"the protocol measures the sample '{self.sample}', which the sample changer has "
-                f"not; {did_you_mean(self.sample, changer.samples())}"
+                f"not; {did_you_mean(self.sample, changer.names())}"
             )
         changer.put(self.sample)
 
 
 def _exercise(changer: SampleChanger, context: ExerciseContext) -> Exercised:
     """Bring every sample into place once, and all into the dark."""
-    measured = [
-        Measured(f"to {name}", duration_text(context.timed_s(partial(changer.put, name))))
-        for name in changer.samples()
-    ]
-    away_s = context.timed_s(partial(changer.put, None))
+    measured = timed(changer, context, "into the dark")
     finding = (
         Finding("fine", "samples rest in the dark while another one is lit (keeps_dark)")
         if changer.keeps_dark()
@@ -110,18 +102,16 @@ def _exercise(changer: SampleChanger, context: ExerciseContext) -> Exercised:
             "if they do, write 'keeps_dark: true'",
         )
     )
-    return Exercised((*measured, Measured("into the dark", duration_text(away_s))), (finding,))
+    return Exercised(tuple(measured), (finding,))
 
 
 SAMPLE_CHANGER: Role[SampleChanger] = Role(
     key=BringSample.device,
     protocol_class=SampleChanger,
     name="sample changer",
-    planned=lambda driver, settings, clock: PlannedSampleChanger(
-        clock,
-        driver.declared_samples(settings),
-        driver.declared_turn_s(settings),
-        keeps_dark=driver.declared_keeps_dark(settings),
+    planned=lambda settings, clock: PlannedSampleChanger(
+        clock, settings.samples, settings.travel, keeps_dark=settings.keeps_dark
     ),
+    on_board=BoardSampleChanger,
     exercise=_exercise,
 )

@@ -180,6 +180,6 @@ SPECTROMETER: Role[Spectrometer] = Role(
     key="spectrometer",
     protocol_class=Spectrometer,
     name="spectrometer",
-    planned=lambda driver, settings, clock: PlannedSpectrometer(clock),
+    planned=lambda settings, clock: PlannedSpectrometer(clock),
     exercise=_exercise,
 )

@@ -1,6 +1,8 @@
-"""Charge and decay of one series, fitted together with states of general kinetic order."""
+"""Charge and decay of one series, fitted together with states of general kinetic order.
 
-from labrig.fit.charge.fit import fit_charge_and_decay
-from labrig.fit.charge.result import ChargeCandidate, ChargeFit, OrderState
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = ["ChargeCandidate", "ChargeFit", "OrderState", "fit_charge_and_decay"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,10 +4,11 @@ A sum of first-order states cannot follow a charge that is convex, as that of Sr
 its first minute and a half: whether orders other than 1 do is told by the Bayesian information
 criterion. Where neighbouring residuals of even the best model go together, χ² and variances are
 divided and multiplied by the factor by which their sums exceed noise, so that a misfit neither
-adds states nor makes parameters look known.
+adds states nor makes parameters look known. Intervals are those of the profile likelihood.
 """
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -15,23 +16,146 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
-from labrig.fit.charge.intervals import ProfiledState, charge_intervals
 from labrig.fit.charge.model import (
     COMMON_PARAMETERS,
     ORDER,
     STATE_PARAMETERS,
+    Readings,
     level_at_off,
     rates_of,
+    readings_of,
 )
-from labrig.fit.charge.readings import Readings, readings_of
 from labrig.fit.charge.result import ChargeCandidate, ChargeFit, FittedReadings, OrderState
-from labrig.fit.least_squares import LeastSquaresFit, least_squares
-from labrig.fit.profile_likelihood import Likelihood
+from labrig.fit.nonlinear_least_squares import LeastSquaresFit, least_squares
+from labrig.fit.profile_likelihood import (
+    Likelihood,
+    LowerMinimumError,
+    NoiseScale,
+    Quantity,
+    Value,
+    exponential,
+    parameter,
+)
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
 from labrig.material import MAX_ORDER
-from labrig.results import Measured, OneSided
+from labrig.results import Measured, OneSided, ProfileInterval
+
+#: Place of log κ among a state's parameters.
+LOG_KAPPA = 0
+
+#: Step of the parameters by which derivatives are differenced.
+STEP = 1e-5
+
+
+class ProfiledState(NamedTuple):
+    """State whose intervals are wanted: its place among the states that were fitted from 0, its
+    number in the output, and whether its order was fitted and κ is known.
+    """
+
+    place: int
+    number: int
+    is_order_fitted: bool
+    is_kappa_known: bool
+
+
+def charge_intervals(
+    likelihood: Likelihood,
+    charge_s: float,
+    states: list[ProfiledState],
+    misfit: float,
+    *,
+    all_of_them: bool,
+) -> dict[str, ProfileInterval]:
+    """Return intervals by the name of a field of `OrderState` and the state's number.
+
+    Parameters
+    ----------
+    likelihood
+        Likelihood at the minimum.
+    charge_s
+        Length of the charge in seconds.
+    states
+        States whose intervals are wanted.
+    misfit
+        Factor of all variances.
+    all_of_them
+        Whether to return all, not only those that two points of the profile show ±σ to miss by more
+        than 20 %.
+    """
+    intervals: dict[str, ProfileInterval] = {}
+    for state in states:
+        for quantity, names in _profiled_quantities(state, charge_s):
+            shown = names.values()
+            if not (all_of_them or any(likelihood.is_asymmetric(quantity, one) for one in shown)):
+                continue
+            try:
+                interval = likelihood.interval(quantity, NoiseScale(misfit))
+            except LowerMinimumError:
+                continue
+            for name, function in names.items():
+                intervals[f"{name} {state.number}"] = interval.mapped(function)
+    return intervals
+
+
+def _profiled_quantities(
+    state: ProfiledState, charge_s: float
+) -> Iterator[tuple[Quantity, dict[str, Callable[[float], float]]]]:
+    """Yield what is profiled of a state, and the fields that are functions of each."""
+    first = state.place * STATE_PARAMETERS
+    if state.is_order_fitted:
+        order = Quantity(parameter(first + ORDER), least=1.0, searched=(1.0, MAX_ORDER))
+        yield order, {"order": float, "exponent": _exponent}
+    at_off = Quantity(_log_rate_at_off(first, charge_s))
+    yield at_off, {"rate_at_off_per_s": exponential, "lifetime_at_off_s": _falling}
+    if state.is_kappa_known:
+        yield Quantity(parameter(first + LOG_KAPPA)), {"kappa_per_s": exponential}
+        yield Quantity(_log_k_r(first)), {"k_r_per_s": exponential}
+
+
+def _log_rate_at_off(first: int, charge_s: float) -> Value:
+    """Return log (b k r(0)^(b − 1)), the rate at which the light falls at lamp off."""
+
+    def of(own: FloatArray) -> float:
+        rates = rates_of(own)
+        level = max(level_at_off(rates, charge_s), np.finfo(float).tiny)
+        return math.log(rates.order * rates.k_r) + (rates.order - 1) * math.log(level)
+
+    def value(theta: FloatArray) -> tuple[float, FloatArray]:
+        own = theta[first : first + STATE_PARAMETERS]
+        gradient = np.zeros(len(theta))
+        for place in range(ORDER + 1):
+            step = STEP * (np.arange(STATE_PARAMETERS) == place)
+            # At an order of 1, a step inwards.
+            low = own if place == ORDER and own[ORDER] - STEP < 1 else own - step
+            gradient[first + place] = (of(own + step) - of(low)) / (own + step - low)[place]
+        return of(own), gradient
+
+    return value
+
+
+def _log_k_r(first: int) -> Value:
+    """Return log k = b log s + (1 − b) log κ."""
+
+    def value(theta: FloatArray) -> tuple[float, FloatArray]:
+        log_kappa, log_speed, order = theta[first : first + ORDER + 1].tolist()
+        gradient = np.zeros(len(theta))
+        gradient[first : first + ORDER + 1] = 1 - order, order, log_speed - log_kappa
+        return order * log_speed + (1 - order) * log_kappa, gradient
+
+    return value
+
+
+def _exponent(order: float) -> float:
+    if order == math.inf:
+        return 1.0
+    return order / (order - 1) if order > 1 else math.inf
+
+
+def _falling(log_rate: float) -> float:
+    return exponential(-log_rate)
+
 
 #: Largest number of states.
 MAX_STATES = 2
@@ -54,8 +178,6 @@ KNOWN_LOG_KAPPA, KNOWN_GAIN = 0.5, 9.0
 ABOVE_FIRST_SIGMAS = 2.0
 #: Chance of noise alone to look like a misfit.
 MISFIT_CHANCE = 1e-3
-#: Relative step of derived quantities' derivatives.
-STEP = 1e-5
 
 
 def fit_charge_and_decay(

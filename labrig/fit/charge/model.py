@@ -13,8 +13,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.ndimage import median_filter
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS, becquerel_of, lit_concentration, lit_step
 
 #: Parameters of a state: log κ, log s, b, log g; and the place of b.
@@ -126,3 +129,157 @@ class _StateLight(NamedTuple):
     light: FloatArray
     slopes: FloatArray
     stimulated: FloatArray
+
+
+#: Readings nearer than this to a switching of the lamp, in steps between readings, are left out.
+SWITCHING_STEPS = 1.5
+#: Least number of readings under the lamp, and of those after it.
+LEAST_READINGS = 4
+#: Neighbours whose median is taken for the mean light where σ is not given.
+NEIGHBOURS = 9
+#: Median of the square of a standard normal variable.
+MEDIAN_SQUARE = 0.4549
+#: Least counts in the variance of a reading.
+LEAST_COUNTS = 4.0
+#: Least light after the lamp, in σ of its mean.
+VISIBLE_SIGMAS = 5.0
+#: Stretches of the charge, of equal times, and of the decay, of equal ratios of times, in which
+#: residuals are summed.
+CHARGE_STRETCHES, DECAY_STRETCHES = 15, 25
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Readings that are fitted, under the lamp first.
+
+    Attributes
+    ----------
+    times
+        When they were read.
+    values, sigma
+        Values with the dark level, and their σ, shape (n,).
+    dark, dark_sigma
+        Mean of the readings before the charge and its σ; 0 without any.
+    """
+
+    times: ChargeAndDecay
+    values: FloatArray
+    sigma: FloatArray
+    dark: float
+    dark_sigma: float
+
+    @property
+    def lit(self) -> int:
+        """Number of readings under the lamp."""
+        return len(self.times.lit_s)
+
+    @property
+    def span_s(self) -> float:
+        """Time of the last reading after lamp on."""
+        return self.times.charge_s + float(self.times.dark_s[-1])
+
+    @property
+    def step_s(self) -> float:
+        """Shortest time between readings."""
+        both = (self.times.lit_s, self.times.dark_s)
+        return min(float(np.diff(each).min()) for each in both)
+
+    def stretches(self) -> list[np.ndarray]:
+        """Return the indices of the readings of each stretch of charge and decay."""
+        times = self.times
+        lit = times.lit_s / times.charge_s * CHARGE_STRETCHES
+        later = np.log(times.dark_s + self.step_s)
+        dark = (later - later[0]) / max(float(np.ptp(later)), 1e-9) * DECAY_STRETCHES
+        groups = np.concatenate(
+            [np.floor(lit), CHARGE_STRETCHES + np.minimum(np.floor(dark), DECAY_STRETCHES - 1)]
+        )
+        return [np.flatnonzero(groups == group) for group in np.unique(groups)]
+
+
+def readings_of(
+    t_s: ArrayLike,
+    values: ArrayLike,
+    sigma: ArrayLike | None,
+    exposure_s: ArrayLike,
+    light_s: tuple[float, float],
+) -> Readings:
+    """Return the readings to be fitted, those while the lamp switches left out.
+
+    The arguments are those of `fit_charge_and_decay`; without σ it is told by the scatter of
+    neighbours, with a variance that is proportional to the value.
+    """
+    on_s, off_s = light_s
+    t, y = np.asarray(t_s, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    if t.ndim != 1 or y.shape != t.shape:
+        raise FitError(f"expected one value for each time, got {y.shape} values, {t.shape} times")
+    if not off_s > on_s:
+        raise FitError(f"expected the lamp off after it was on at {on_s:g} s, got {off_s:g} s")
+    exposure = np.broadcast_to(np.asarray(exposure_s, dtype=np.float64), t.shape)
+    for quantity, numbers in (("times", t), ("values", y), ("exposures", exposure)):
+        if not np.isfinite(numbers).all():
+            raise FitError(f"expected finite {quantity}, got NaN or infinite ones; leave them out")
+    order = np.argsort(t, kind="stable")
+    t, y, exposure = t[order], y[order], exposure[order]
+    if len(t) < 2 or not (steps := np.diff(t)).all():
+        raise FitError("expected readings at different times, got several at the same time")
+    guard = SWITCHING_STEPS * float(np.median(steps))
+    before = np.flatnonzero(t + exposure < on_s - guard)
+    lit = np.flatnonzero((t > on_s + guard) & (t + exposure < off_s - guard))
+    after = np.flatnonzero(t > off_s + guard)
+    if min(len(lit), len(after)) < LEAST_READINGS:
+        raise FitError(
+            f"expected {LEAST_READINGS} readings or more while the lamp is on, from {on_s:g} s to "
+            f"{off_s:g} s, and as many later, got {len(lit)} and {len(after)}; the times are from "
+            f"{t[0]:g} s to {t[-1]:g} s"
+        )
+    parts = (before, lit, after)
+    if sigma is None:
+        used = _counting_sigma([y[part] for part in parts])
+    else:
+        given = np.broadcast_to(np.asarray(sigma, dtype=np.float64), t.shape)[order]
+        if not np.all(given > 0):
+            raise FitError(f"expected σ > 0, got {given.min():g}")
+        used = [given[part] for part in parts]
+    kept = np.concatenate([lit, after])
+    dark_weights = used[0] ** -2.0
+    readings = Readings(
+        ChargeAndDecay(
+            off_s - on_s, (t + exposure / 2)[lit] - on_s, t[after] - off_s, exposure[after]
+        ),
+        y[kept],
+        np.concatenate(used[1:]),
+        float(np.average(y[before], weights=dark_weights)) if len(before) else 0.0,
+        float(dark_weights.sum() ** -0.5) if len(before) else 0.0,
+    )
+    _refuse_darkness(readings)
+    return readings
+
+
+def _refuse_darkness(readings: Readings) -> None:
+    """Refuse readings after the lamp of which no first few stand out of their noise."""
+    glow = readings.values[readings.lit :] - readings.dark
+    weights = readings.sigma[readings.lit :] ** -2.0
+    total = np.cumsum(weights)
+    mean_sigma = np.hypot(total**-0.5, readings.dark_sigma)
+    if not np.max(np.cumsum(weights * glow) / total / mean_sigma) > VISIBLE_SIGMAS:
+        raise FitError(
+            "expected light that decays after the lamp, got none above the noise; check the times "
+            "of the lamp"
+        )
+
+
+def _counting_sigma(parts: list[FloatArray]) -> list[FloatArray]:
+    """Return the σ of each part, σ² = c y with c by the scatter of neighbours."""
+    squares, levels, smooth = [], [], []
+    for values in parts:
+        level = median_filter(values, NEIGHBOURS, mode="nearest") if len(values) else values
+        smooth.append(level)
+        if len(values) > 2:
+            squares.append((values[2:] - 2 * values[1:-1] + values[:-2]) ** 2 / 6)
+            levels.append(level[1:-1])
+    square, light = np.concatenate(squares), np.concatenate(levels)
+    bright = light > np.median(light)
+    if not bright.any() or not (count := np.median(square[bright] / light[bright])) > 0:
+        raise FitError("expected values that scatter, got a smooth curve; give their σ")
+    count /= MEDIAN_SQUARE
+    return [np.sqrt(count * np.maximum(level, LEAST_COUNTS * count)) for level in smooth]

@@ -1,19 +1,8 @@
-"""Decay fits: rates and amplitudes of the states of a phosphor after lamp off."""
+"""Decay fits: rates and amplitudes of the states of a phosphor after lamp off.
 
-from labrig.fit.decay.fit import fit_decay
-from labrig.fit.decay.periodic_flicker import Periodogram, periodogram
-from labrig.fit.decay.result import DecayFit
-from labrig.fit.decay.selection import F_TEST_LEVEL
-from labrig.fit.decay.shared import DecayTable, fit_shared_rates
-from labrig.fit.decay.states import APART_SIGMAS
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "APART_SIGMAS",
-    "F_TEST_LEVEL",
-    "DecayFit",
-    "DecayTable",
-    "Periodogram",
-    "fit_decay",
-    "fit_shared_rates",
-    "periodogram",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

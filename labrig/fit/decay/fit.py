@@ -7,29 +7,28 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.fit.decay.envelope import Envelope, envelope
+from labrig.fit.decay.envelope import (
+    Envelope,
+    envelope,
+    residual_sigma,
+    scaled_sigma,
+    sigma_scale,
+    with_equal_sigma,
+    with_scatter_sigma,
+)
 from labrig.fit.decay.fit_warnings import (
     Evidence,
     refuse_if_constant,
     refuse_if_rising,
     student_factor,
 )
-from labrig.fit.decay.law_ties import tie_warnings
-from labrig.fit.decay.laws import LawFit, fit_laws
-from labrig.fit.decay.noise_likelihood import NoiseLikelihood
+from labrig.fit.decay.laws import LawFit, fit_laws, tie_warnings
+from labrig.fit.decay.noise_correlation import NoiseLikelihood
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
 from labrig.fit.decay.result import DecayFit, assemble
-from labrig.fit.decay.scatter import (
-    residual_sigma,
-    scaled_sigma,
-    with_equal_sigma,
-    with_scatter_sigma,
-)
 from labrig.fit.decay.selection import choose_states, is_needed, law_margin
-from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
-from labrig.fit.decay.sigma_scale import sigma_scale
+from labrig.fit.decay.series import NO_DECAY, DecaySeries, WhitenedSeries, decay_series, whitened
 from labrig.fit.decay.states import StatesFit, refit
-from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError

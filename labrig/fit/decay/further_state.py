@@ -7,6 +7,11 @@ the further state explains, a = −q·r/q² ± 1/|q| its amplitude, and −J⁺c
 The chance that it is there follows from the likelihood, averaged over its rate and over the a ≥ 0
 that are usual (model averaging; J. Hoeting et al., Statistical Science 14, 1999). Its effect on the
 others, times its chance, is a part of their covariance.
+
+If all rates grow as k (1 + γ t), a state's signal is a (1 + γ t) e^(−k (t + γ t²/2)). A fit with
+constant rates takes what it can of the derivative c by γ, and its parameters move by J⁺c a unit of
+γ, J the Jacobian. Of a drift of some kelvins an hour the rest is below the noise of a decay of
+minutes, so that nothing in the data tells it.
 """
 
 from dataclasses import dataclass
@@ -14,9 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr, ndtri_exp
 
-from labrig.fit.decay.series import FASTEST_DECAYS
+from labrig.fit.decay.series import FASTEST_DECAYS, WhitenedSeries
 from labrig.fit.decay.states import StatesFit
-from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.foundation.arrays import FloatArray
 from labrig.material import exponential_means
 
@@ -222,3 +226,29 @@ def hidden_state(data: WhitenedSeries, fit: StatesFit, fast: FastStates) -> Hidd
         covariance=(effect * (probability * mean_square)) @ effect.T,
         is_likely=chance > LIKELY,
     )
+
+
+#: Gauss–Legendre nodes and weights on [0, 1].
+_NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)
+NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
+
+
+def drift_effect(data: WhitenedSeries, fit: StatesFit) -> FloatArray:
+    """Return the change of the fitted parameters by a drift γ of 1 per span, shape (p,).
+
+    The values without it are those of the temperature at lamp off.
+    """
+    series, joint = data.series, fit.joint
+    rates = np.exp(fit.log_rates)
+    # Amplitudes are those at the first frame, times are counted from lamp off.
+    amplitudes = fit.amplitudes * np.exp(rates * series.start)
+    time = (series.t + series.start)[:, None] + series.exposure[:, None] * NODES
+    by_drift = np.zeros(time.shape)
+    for rate, amplitude in zip(rates, amplitudes, strict=True):
+        by_drift += amplitude * np.exp(-rate * time) * (time - rate * time**2 / 2)
+    column = data.signal_design(data.constant(joint.weights), (by_drift @ FRACTIONS)[:, None])
+    jacobian = joint.least_squares.jacobian
+    scale = np.linalg.norm(jacobian, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    effect = np.linalg.lstsq(jacobian / scale, column, rcond=RCOND)[0][:, 0] / scale
+    return np.asarray(effect)

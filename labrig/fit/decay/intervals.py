@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.fit_warnings import Evidence
-from labrig.fit.decay.joint import JointFit, JointProblem, Shape
 from labrig.fit.decay.laws import LawFit
+from labrig.fit.decay.series import WhitenedSeries
 from labrig.fit.decay.states import StatesFit, exponentials
-from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.decay.variable_projection import JointFit, JointProblem, Shape
 from labrig.fit.profile_likelihood import (
     Likelihood,
     LowerMinimumError,

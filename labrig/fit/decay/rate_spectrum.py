@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.decay.noise_likelihood import NoiseLikelihood
-from labrig.fit.decay.search import projection
-from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.decay.noise_correlation import NoiseLikelihood
+from labrig.fit.decay.series import WhitenedSeries
+from labrig.fit.decay.variable_projection import projection
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.material import exponential_means

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from labrig.fit.decay.further_state import promising_rate
-from labrig.fit.decay.joint import JointFit
-from labrig.fit.decay.noise_likelihood import NoiseLikelihood
+from labrig.fit.decay.noise_correlation import NoiseLikelihood
+from labrig.fit.decay.series import WhitenedSeries
 from labrig.fit.decay.states import StatesFit, fit_one_more, fit_states, refit
-from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.decay.variable_projection import JointFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.results import Candidate

@@ -14,11 +14,11 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from labrig.fit.decay.fit import MOST_LIFETIMES
-from labrig.fit.decay.search import LOG_RATE_TOLERANCE, MAX_EVALUATIONS, grid_size
 from labrig.fit.decay.selection import F_TEST_LEVEL, REFUTING_BIC
 from labrig.fit.decay.series import FASTEST_DECAYS, NO_DECAY, SLOWEST_SPANS
 from labrig.fit.decay.states import ILL_DETERMINED, MERGED_LOG_RATE, NEGLIGIBLE_AMPLITUDE
-from labrig.fit.least_squares import LeastSquaresFit, least_squares
+from labrig.fit.decay.variable_projection import LOG_RATE_TOLERANCE, MAX_EVALUATIONS, grid_size
+from labrig.fit.nonlinear_least_squares import LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares

@@ -5,11 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.decay.joint import JointFit, Shape, fit_jointly
-from labrig.fit.decay.search import projection, search_rates
-from labrig.fit.decay.series import NO_DECAY, DecaySeries
-from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import Ending
+from labrig.fit.decay.series import NO_DECAY, DecaySeries, WhitenedSeries
+from labrig.fit.decay.variable_projection import (
+    JointFit,
+    Shape,
+    fit_jointly,
+    projection,
+    search_rates,
+)
+from labrig.fit.nonlinear_least_squares import Ending
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.material import exponential_means_and_slopes

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from labrig.fit.excitation.parameters import Parameters, RelativeSigmas, is_fitted
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.least_squares import LeastSquaresFit
+from labrig.fit.nonlinear_least_squares import LeastSquaresFit
 from labrig.fit.profile_likelihood import (
     Likelihood,
     LowerMinimumError,

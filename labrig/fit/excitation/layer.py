@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from labrig.fit.excitation.light_errors import LightErrors
+from labrig.fit.excitation.model_tests import LightErrors
 from labrig.fit.excitation.parameters import RelativeSigmas
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.least_squares import least_squares
+from labrig.fit.nonlinear_least_squares import least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.results import ChargingSeries, DensityBasis, FittedExcitation, LayerEffect
 

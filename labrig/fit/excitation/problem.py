@@ -11,8 +11,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from labrig.fit.excitation.level_slopes import Levels
-from labrig.fit.excitation.levels import levels, levels_and_slopes
+from labrig.fit.excitation.levels import Levels, levels, levels_and_slopes
 from labrig.fit.excitation.parameters import Parameters, Rates, RelativeSigmas, is_fitted
 from labrig.foundation.arrays import FloatArray
 from labrig.results import ChargingSeries

@@ -2,63 +2,10 @@
 
 One light after the other, and an RGB camera, after P. McEvoy, *Capture and simulation of
 fluorescence in fabrics* (Chalmers, 2020), called the thesis here.
+
+Names are listed in `__init__.pyi`, and loaded when first used.
 """
 
-from labrig.fit.fluorescence.colour import PredictedColour, predicted_colour
-from labrig.fit.fluorescence.estimate import fit_fluorescence
-from labrig.fit.fluorescence.joint import JointEstimator
-from labrig.fit.fluorescence.per_led import fit_per_led
-from labrig.fit.fluorescence.placement import (
-    RECOMMENDED_NM,
-    LedSet,
-    even_peaks_nm,
-    moved_leds,
-    require_peaks,
-    study_set,
-    usual_led,
-)
-from labrig.fit.fluorescence.result import (
-    EstimatedFluorophore,
-    EstimateFact,
-    ExtrapolatedExcitation,
-    FluorescenceFit,
-    FluorophoreNumber,
-    Method,
-    MoreThanWhite,
-    Surfaces,
-    UnexplainedValues,
-    UnknownBrightness,
-)
-from labrig.fit.fluorescence.study import LedStudy, gaussian_led, study_leds
-from labrig.fit.fluorescence.system import Exposure, FluorescenceSystem, fluorescence_system
+import lazy_loader
 
-__all__ = [
-    "RECOMMENDED_NM",
-    "EstimateFact",
-    "EstimatedFluorophore",
-    "Exposure",
-    "ExtrapolatedExcitation",
-    "FluorescenceFit",
-    "FluorescenceSystem",
-    "FluorophoreNumber",
-    "JointEstimator",
-    "LedSet",
-    "LedStudy",
-    "Method",
-    "MoreThanWhite",
-    "PredictedColour",
-    "Surfaces",
-    "UnexplainedValues",
-    "UnknownBrightness",
-    "even_peaks_nm",
-    "fit_fluorescence",
-    "fit_per_led",
-    "fluorescence_system",
-    "gaussian_led",
-    "moved_leds",
-    "predicted_colour",
-    "require_peaks",
-    "study_leds",
-    "study_set",
-    "usual_led",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

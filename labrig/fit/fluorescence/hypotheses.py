@@ -17,20 +17,20 @@ from itertools import product
 import numpy as np
 from scipy.special import logsumexp
 
-from labrig.fit.fluorescence.prior import (
+from labrig.fit.fluorescence.surface_prior import (
     BACKGROUND_SIGMAS,
     EXCITATION_SIGMAS,
     REFLECTANCE,
     REFLECTANCE_SIGMAS,
+    EmissionShapes,
+    Unknowns,
     deviation_correlation,
     emission_modes,
     excitation_covariance,
     reflectance_covariance,
     stokes_edge,
 )
-from labrig.fit.fluorescence.shapes import EmissionShapes
 from labrig.fit.fluorescence.system import FluorescenceSystem
-from labrig.fit.fluorescence.unknowns import Unknowns
 from labrig.foundation.arrays import FloatArray
 
 MOST_FLUOROPHORES = 3

@@ -1,36 +1,8 @@
-"""Spectra and brightnesses of narrow-band LEDs from a white reference."""
+"""Spectra and brightnesses of narrow-band LEDs from a white reference.
 
-from labrig.fit.leds.band import LedBand, led_band, light_within
-from labrig.fit.leds.brightness import (
-    CURVES_OF_MODEL,
-    RESPONSE_CALIBRATED,
-    RESPONSE_UNKNOWN,
-    SKEW_SIGMA,
-    WIDTH_SIGMA,
-    BrightnessFit,
-    LedLightMeasured,
-    ResponseError,
-    centroid_nm,
-    changed_spectrum,
-    fit_brightness,
-)
-from labrig.fit.leds.identity import ChannelMatch, match_channels
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "CURVES_OF_MODEL",
-    "RESPONSE_CALIBRATED",
-    "RESPONSE_UNKNOWN",
-    "SKEW_SIGMA",
-    "WIDTH_SIGMA",
-    "BrightnessFit",
-    "ChannelMatch",
-    "LedBand",
-    "LedLightMeasured",
-    "ResponseError",
-    "centroid_nm",
-    "changed_spectrum",
-    "fit_brightness",
-    "led_band",
-    "light_within",
-    "match_channels",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,21 +1,8 @@
-"""Calibration of a linear variable filter: mercury lines, and colour filters over a grey card."""
+"""Calibration of a linear variable filter: mercury lines, and colour filters over a grey card.
 
-from labrig.fit.lvf.calibration import LvfCalibration, calibrate_lvf
-from labrig.fit.lvf.card_pictures import compare_card_pictures, place_means
-from labrig.fit.lvf.filter_choice import most_informative_filters
-from labrig.fit.lvf.line_model import MERCURY, Line
-from labrig.fit.lvf.lines import locate_lines
-from labrig.fit.lvf.wavelength_fit import WavelengthFit, fit_wavelengths
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "MERCURY",
-    "Line",
-    "LvfCalibration",
-    "WavelengthFit",
-    "calibrate_lvf",
-    "compare_card_pictures",
-    "fit_wavelengths",
-    "locate_lines",
-    "most_informative_filters",
-    "place_means",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,15 +1,8 @@
-"""Mixtures of normal densities that stand for re-radiation matrices."""
+"""Mixtures of normal densities that stand for re-radiation matrices.
 
-from labrig.fit.mixture.fit import fit_mixture
-from labrig.fit.mixture.result import HeldOutError, LightKept, MixtureCandidate, MixtureFit
-from labrig.fit.mixture.texture import MixtureTexture, fit_mixture_texture
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "HeldOutError",
-    "LightKept",
-    "MixtureCandidate",
-    "MixtureFit",
-    "MixtureTexture",
-    "fit_mixture",
-    "fit_mixture_texture",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,23 +6,125 @@ the error is χ² of all entries as they were measured, negative ones too: what 
 noise is partly light.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Literal
 
 import numpy as np
 
 from labrig.fit.mixture.candidate import Candidate, candidates, likeliest
-from labrig.fit.mixture.cross_validation import held_out_errors
-from labrig.fit.mixture.entries import FALSE_DISCOVERY_RATE, StokesEntries, stokes_entries
-from labrig.fit.mixture.light_kept import light_kept, light_sigma
-from labrig.fit.mixture.refinement import PARAMETERS
-from labrig.fit.mixture.result import HeldOutError, MixtureCandidate, MixtureFit
-from labrig.fit.mixture.scaling import Scaling, chi2, masked_mse, with_colours, with_integral
-from labrig.fit.mixture.skewed_refinement import PARAMETERS as SKEWED_PARAMETERS
+from labrig.fit.mixture.entries import (
+    FALSE_DISCOVERY_RATE,
+    Scaling,
+    StokesEntries,
+    chi2,
+    masked_mse,
+    modelled,
+    stokes_entries,
+    with_colours,
+    with_integral,
+)
+from labrig.fit.mixture.refinement import PARAMETERS, PARAMETERS as SKEWED_PARAMETERS
+from labrig.fit.mixture.result import HeldOutError, LightKept, MixtureCandidate, MixtureFit
+from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
-from labrig.material import ReradiationMatrix
+from labrig.material import ReradiationMatrix, ReradiationMixture
 from labrig.optics import Spectrum
+
+FOLDS = 5
+SEED = 2021
+
+
+def held_out_errors(entries: StokesEntries, most: int, skewed: bool) -> list[HeldOutError]:
+    """Return the errors of 1 to `most` components, each entry predicted from other ones.
+
+    Entries are dealt out by chance to five folds of equal size, always the same.
+    """
+    deal = np.random.default_rng(SEED).permutation(len(entries.value)) % FOLDS
+    by_fold = [list(_errors(entries, deal == fold, most, skewed)) for fold in range(FOLDS)]
+    return [
+        HeldOutError(float(np.mean(errors)), float(np.std(errors, ddof=1) / np.sqrt(FOLDS)))
+        for errors in zip(*by_fold, strict=True)
+    ]
+
+
+def _errors(
+    entries: StokesEntries, held_out: np.ndarray, most: int, skewed: bool
+) -> Iterator[float]:
+    training, test = entries.where(~held_out), entries.where(held_out)
+    for candidate in islice(candidates(training, 1, skewed, is_final=False), most):
+        off = modelled(test, candidate.mixture) - test.wanted
+        yield float(np.average(off**2, weights=test.weight**2))
+
+
+#: Least part of the light, and least number of its σ, with which a column is compared.
+LEAST_PART, LEAST_SIGMAS = 0.01, 5.0
+
+
+def light_sigma(matrix: ReradiationMatrix, entries: StokesEntries) -> float | None:
+    """Return σ of the light in all entries; None if they are not weighted by σ."""
+    sigma = None if entries.sigma is None else _column_sigma(matrix, entries)
+    return None if sigma is None else float(np.sqrt(sigma @ sigma))
+
+
+def light_kept(
+    matrix: ReradiationMatrix, entries: StokesEntries, mixture: ReradiationMixture
+) -> LightKept:
+    """Compare the light of a mixture with that in the entries as they were measured.
+
+    Parameters
+    ----------
+    matrix
+        The matrix, of whose columns errors may correlate.
+    entries
+        Its entries on the Stokes side.
+    mixture
+        The mixture.
+    """
+    measured = _by_column(matrix, entries, entries.measured)
+    kept = _by_column(matrix, entries, modelled(entries, mixture))
+    sigma = _column_sigma(matrix, entries)
+    total = float(measured.sum())
+    bright = measured >= LEAST_PART * abs(total)
+    off = np.abs(kept - measured)
+    if sigma is not None:
+        bright &= measured >= LEAST_SIGMAS * sigma
+        off = off / np.where(sigma > 0, sigma, 1.0)
+    else:
+        off = off / np.where(bright, measured, 1.0)
+    parts = np.where(bright, kept / np.where(bright, measured, 1.0), 1.0)
+    worst = int(np.argmax(np.where(bright, off, 0.0)))
+    part = float(kept.sum()) / total if total > 0 else math.nan
+    return LightKept(
+        total=part,
+        total_sigma=None if sigma is None else part * float(np.sqrt(sigma @ sigma)) / abs(total),
+        worst_input_nm=float(matrix.input_nm[worst]),
+        worst=float(parts[worst]),
+        worst_sigma=None
+        if sigma is None or not bright[worst]
+        else float(parts[worst] * sigma[worst] / measured[worst]),
+    )
+
+
+def _by_column(matrix: ReradiationMatrix, entries: StokesEntries, values: FloatArray) -> FloatArray:
+    """Return the sums over each input band, shape (m,)."""
+    column = np.searchsorted(matrix.input_nm, entries.input_nm)
+    return np.bincount(column, values, len(matrix.input_nm)) * matrix.input_width_nm
+
+
+def _column_sigma(matrix: ReradiationMatrix, entries: StokesEntries) -> FloatArray | None:
+    """Return σ of the light in each input band, shape (m,); None if that of entries is unknown."""
+    if matrix.reradiation_sigma is None:
+        return None
+    row = np.searchsorted(matrix.output_nm, entries.output_nm)
+    column = np.searchsorted(matrix.input_nm, entries.input_nm)
+    sigma = np.nan_to_num(matrix.reradiation_sigma[row, column]) * entries.output_width_nm
+    independent = _by_column(matrix, entries, sigma**2) * matrix.input_width_nm
+    together = _by_column(matrix, entries, sigma) ** 2
+    common = matrix.column_correlation if matrix.column_correlation is not None else 0.0
+    return np.asarray(np.sqrt((1 - common) * independent + common * together))
+
 
 Selection = Literal["bic", "cross-validation"]
 

@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from labrig.fit.mixture.candidate import LEAST_SD_BANDS
-from labrig.fit.mixture.expectation_maximisation import maximise_likelihood
-from labrig.fit.mixture.gaussians import AnyFloatArray, Gaussians, monomials_of, product
+from labrig.fit.mixture.gaussians import (
+    AnyFloatArray,
+    Gaussians,
+    maximise_likelihood,
+    monomials_of,
+    product,
+)
 from labrig.foundation.arrays import Float32Array, FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture

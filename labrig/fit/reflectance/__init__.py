@@ -1,25 +1,8 @@
-"""Albedo of a sample that fluoresces and glows, from its light beside that of a grey card."""
+"""Albedo of a sample that fluoresces and glows, from its light beside that of a grey card.
 
-from labrig.fit.reflectance.fit import (
-    AlbedoFit,
-    LitStrip,
-    fit_albedo,
-    relative_to_card,
-    unresolved,
-)
-from labrig.fit.reflectance.luminescence import (
-    Luminescence,
-    StripLight,
-    luminescence_by_glow,
-)
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "AlbedoFit",
-    "LitStrip",
-    "Luminescence",
-    "StripLight",
-    "fit_albedo",
-    "luminescence_by_glow",
-    "relative_to_card",
-    "unresolved",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

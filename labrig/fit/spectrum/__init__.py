@@ -1,34 +1,8 @@
-"""Spectra from pictures through a variable filter, or from any sensor with known channels."""
+"""Spectra from pictures through a variable filter, or from any sensor with known channels.
 
-from labrig.fit.spectrum.fit import (
-    BandedSpectrum,
-    SpectrumFit,
-    fit_spectrum,
-)
-from labrig.fit.spectrum.line import LineFit, fit_line
-from labrig.fit.spectrum.lines import DECISIVE
-from labrig.fit.spectrum.minimum import nonnegative_minimum
-from labrig.fit.spectrum.system import (
-    CurveError,
-    SpectralSystem,
-    camera_modes,
-    curve_modes,
-    smooth_modes,
-    system_through_lvf,
-)
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "DECISIVE",
-    "BandedSpectrum",
-    "CurveError",
-    "LineFit",
-    "SpectralSystem",
-    "SpectrumFit",
-    "camera_modes",
-    "curve_modes",
-    "fit_line",
-    "fit_spectrum",
-    "nonnegative_minimum",
-    "smooth_modes",
-    "system_through_lvf",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -19,12 +19,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from labrig.fit.spectrum.basis import Basis, Problem, smooth
-from labrig.fit.spectrum.lines import DECISIVE, WithLines, lines_of
-from labrig.fit.spectrum.minimum import nonnegative_minimum
-from labrig.fit.spectrum.smooth import WEIGHTS, Prior, Whitened, normalised
-from labrig.fit.spectrum.system import SpectralSystem
-from labrig.fit.spectrum.values import measured
+from labrig.fit.spectrum.lines import DECISIVE, Basis, Problem, WithLines, lines_of, smooth
+from labrig.fit.spectrum.system import (
+    WEIGHTS,
+    Prior,
+    SpectralSystem,
+    Whitened,
+    measured,
+    nonnegative_minimum,
+    normalised,
+)
 from labrig.foundation.arrays import FloatArray
 from labrig.optics import band_means
 

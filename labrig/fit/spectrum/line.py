@@ -14,8 +14,7 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
-from labrig.fit.spectrum.system import SpectralSystem
-from labrig.fit.spectrum.values import measured
+from labrig.fit.spectrum.system import SpectralSystem, measured
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 

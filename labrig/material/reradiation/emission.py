@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from labrig.foundation.errors import DataError, UsageError
-from labrig.material.reradiation.evidence import reradiates
 from labrig.material.reradiation.formats import matrix_files, read_reradiation
 from labrig.material.reradiation.matrix import ReradiationMatrix
-from labrig.material.reradiation.noise import with_sigma
+from labrig.material.reradiation.noise import reradiates, with_sigma
 from labrig.optics import Spectrum, read_curve_file, read_spectrum
 
 

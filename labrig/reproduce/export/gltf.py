@@ -17,7 +17,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.output_file import write_durably
 from labrig.optics import srgb_bytes
-from labrig.reproduce.export.exported_scene import (
+from labrig.reproduce.export.scene_export import (
     ExportedMesh,
     Glow,
     frame_count,

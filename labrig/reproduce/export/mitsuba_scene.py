@@ -16,7 +16,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.exr_file import write_exr
 from labrig.foundation.output_file import make_folder, write_durably, write_text
-from labrig.reproduce.export.exported_scene import (
+from labrig.reproduce.export.scene_export import (
     ExportedMesh,
     Glow,
     frame_count,

@@ -1,15 +1,230 @@
-"""Spectral frames as a screen shows them, with one exposure or each with its own."""
+"""Spectral frames as a screen shows them, with one exposure or each with its own.
+
+The look of night is that of W. B. Thompson, P. Shirley and J. A. Ferwerda, A Spatial
+Post-Processing Algorithm for Images of Night Scenes, Journal of Graphics Tools 7(1), 2002, but with
+the rods' luminance from the spectra and not from X, Y, Z. It is an appearance, for people who look
+at a screen in a lit room; it measures nothing.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
-from labrig.optics import Spectrum
-from labrig.reproduce.picture.display import Display, White, is_white, tristimulus
+from labrig.optics import Spectrum, band_integrals, scotopic_efficacy
+from labrig.reproduce.picture.display import Display, White, is_white, tristimulus, weighted_bands
 from labrig.reproduce.picture.exr import SpectralFrame
-from labrig.reproduce.picture.night import NightLook, night_view
+
+#: Luminances in cd/m² below which rods see alone, and above which cones do.
+RODS_ALONE_CD_PER_M2, CONES_ALONE_CD_PER_M2 = 0.01, 10.0
+#: The wider Gaussian of a difference of Gaussians over the narrower.
+_WIDER = 1.6
+#: Chromaticities x = y of equal energy and of the bluish grey of night.
+_GREY, _BLUE = 1 / 3, 1 / 4
+
+
+@dataclass(frozen=True)
+class NightLook:
+    """Parameters of the look of a night.
+
+    Parameters
+    ----------
+    rods
+        Share k of the rods, 0 to 1, the same for all pixels, as relative images need it. None: by
+        the luminance Y of each pixel in cd/m², linear in log Y from 1 at 0.01 to 0 at 10 cd/m².
+    blue_shift
+        Shift b from grey to blue of what rods see alone, 0 to 1.
+    blur_px
+        Standard deviation s of the narrower Gaussian in pixels, ≥ 0.
+    sharpening
+        Exponent γ > 0 of the edges: 1 keeps what the narrower Gaussian leaves, more emphasises weak
+        edges.
+    noise
+        Standard deviation of the noise relative to white, ≥ 0.
+    seed
+        Seed of the noise.
+
+    Raises
+    ------
+    UsageError
+        A parameter is outside of its range.
+
+    Examples
+    --------
+    >>> from labrig.reproduce import NightLook
+    >>> NightLook(rods=0.8).sharpening
+    1.25
+    """
+
+    rods: float | None = None
+    blue_shift: float = 0.5
+    blur_px: float = 1.6
+    sharpening: float = 1.25
+    noise: float = 0.0125
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name, value in (("rods", self.rods), ("blue_shift", self.blue_shift)):
+            if value is not None and not 0 <= value <= 1:
+                raise UsageError(f"{name}: expected a share from 0 to 1, got {value:g}")
+        for name, value in (("blur_px", self.blur_px), ("noise", self.noise)):
+            if not 0 <= value < np.inf:
+                raise UsageError(f"{name}: expected a number ≥ 0, got {value:g}")
+        if not 0 < self.sharpening < np.inf:
+            raise UsageError(f"sharpening: expected an exponent above 0, got {self.sharpening:g}")
+        if self.seed < 0:
+            raise UsageError(f"seed: expected a number ≥ 0, got {self.seed}")
+
+    def share_of_rods(self, luminance: ArrayLike) -> FloatArray:
+        """Return k for luminances in cd/m², of the same shape."""
+        y = np.asarray(luminance, dtype=np.float64)
+        if self.rods is not None:
+            return np.full(y.shape, self.rods)
+        low, high = np.log10([RODS_ALONE_CD_PER_M2, CONES_ALONE_CD_PER_M2])
+        exponent = np.log10(np.maximum(y, RODS_ALONE_CD_PER_M2))
+        return np.asarray(np.clip((high - exponent) / (high - low), 0.0, 1.0))
+
+
+def scotopic_luminance(radiance: ArrayLike, edges_nm: ArrayLike) -> FloatArray:
+    """Return the luminance V of a spectral image for the rods, by V′(λ) of CIE 1951.
+
+    Parameters
+    ----------
+    radiance
+        Mean radiance in each band in W m⁻² sr⁻¹ nm⁻¹ or relative, shape (…, bands).
+    edges_nm
+        Rising edges of the bands in nm, shape (bands + 1,).
+
+    Returns
+    -------
+    ndarray
+        Scotopic luminance in cd/m² (1700 lm/W at 507 nm), shape (…).
+
+    Raises
+    ------
+    UsageError
+        The bands do not fit the image, or a radiance is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reproduce import scotopic_luminance, tristimulus
+    >>> edges_nm = np.linspace(300, 780, 25)
+    >>> equal_energy = np.full(24, 1e-3)
+    >>> luminance = tristimulus(equal_energy, edges_nm)[1]
+    >>> f"{scotopic_luminance(equal_energy, edges_nm) / luminance:.2f}"
+    '2.26'
+    """
+    edges = np.asarray(edges_nm, dtype=np.float64)
+    table_nm = np.arange(300.0, 831.0)
+    weights = band_integrals(table_nm, scotopic_efficacy(table_nm)[:, np.newaxis], edges)
+    return np.asarray(weighted_bands(radiance, edges, weights)[..., 0])
+
+
+def night_view(
+    radiance: ArrayLike, edges_nm: ArrayLike, look: NightLook, display: Display | None = None
+) -> tuple[FloatArray, Display]:
+    """Return what is seen of a spectral image at night.
+
+    Of a pixel with luminance Y, chromaticity (x, y) and the rods' share k, it is Y′ = (1 − k) Y +
+    k V and x′ = (1 − k) x + k/3, x″ = (1 − k b) x′ + k b/4, and y alike. Relative to white, Y′ is
+    blurred by Gaussians of s and 1.6 s into G₁ and G₂, d = G₁ − G₂, and becomes
+    G₂ + sign(d) abs(d)^(1/γ) + noise where rods see alone; in between it is mixed with Y′ by k.
+
+    Parameters
+    ----------
+    radiance
+        Mean radiance in each band in W m⁻² sr⁻¹ nm⁻¹, or relative with `rods` given, shape (height,
+        width, bands).
+    edges_nm
+        Rising edges of the bands in nm, shape (bands + 1,).
+    look
+        Parameters of the look.
+    display
+        Display whose white is that of noise and edges; None for automatic exposure of Y′.
+
+    Returns
+    -------
+    xyz : ndarray
+        X, Y, Z of what is seen, shape (height, width, 3).
+    display : Display
+        Display on which it is to be shown.
+
+    Raises
+    ------
+    UsageError
+        The bands do not fit the image, a radiance is not finite, or all is dark and there is no
+        display.
+
+    References
+    ----------
+    W. B. Thompson, P. Shirley and J. A. Ferwerda, *A spatial post-processing algorithm for images
+    of night scenes*, Journal of Graphics Tools 7(1), 2002. There, k and b are those of a picture;
+    that both grow with k from pixel to pixel, so that a lit place keeps its look, is labrig's.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reproduce import NightLook, night_view
+    >>> edges_nm = np.linspace(300, 780, 25)
+    >>> starlight = np.full((4, 4, 24), 1e-8)
+    >>> xyz, display = night_view(starlight, edges_nm, NightLook(noise=0.0))
+    >>> f"{display.white_luminance:.4f} cd/m², {xyz[0, 0, 2] / xyz[0, 0, 1]:.2f}"
+    '0.0022 cd/m², 1.43'
+    """
+    xyz = tristimulus(radiance, edges_nm)
+    if xyz.ndim != 3:
+        raise UsageError(f"expected an image (height, width, bands), got {xyz.ndim} dimensions")
+    share = look.share_of_rods(xyz[..., 1])
+    luminance = (1 - share) * xyz[..., 1] + share * scotopic_luminance(radiance, edges_nm)
+    chromaticity = _night_chromaticity(xyz, share, look.blue_shift)
+    if display is None:
+        display = Display.automatic(_from_chromaticity(chromaticity, luminance))
+    white = display.white_luminance
+    blurred = white * _by_rods(luminance / white, look)
+    luminance = (1 - share) * luminance + share * blurred
+    return _from_chromaticity(chromaticity, luminance), display
+
+
+def _night_chromaticity(xyz: FloatArray, share: FloatArray, blue_shift: float) -> FloatArray:
+    """Return x″, y″ of X, Y, Z (…, 3), shape (…, 2); black is grey."""
+    total = xyz.sum(axis=-1, keepdims=True)
+    seen = np.where(total > 0, xyz[..., :2] / np.where(total > 0, total, 1.0), _GREY)
+    k = share[..., np.newaxis]
+    b = blue_shift * k
+    grey = (1 - k) * seen + k * _GREY
+    return np.asarray((1 - b) * grey + b * _BLUE)
+
+
+def _from_chromaticity(chromaticity: FloatArray, luminance: FloatArray) -> FloatArray:
+    """Return X, Y, Z of x, y (…, 2) and Y (…)."""
+    x, y = np.moveaxis(chromaticity, -1, 0)
+    # y = 0 has no luminance: extreme violet of a relative image.
+    per_y = luminance / np.maximum(y, np.finfo(float).tiny)
+    return np.where(
+        (luminance > 0)[..., np.newaxis],
+        np.stack([x * per_y, luminance, (1 - x - y) * per_y], axis=-1),
+        0.0,
+    )
+
+
+def _by_rods(relative: FloatArray, look: NightLook) -> FloatArray:
+    """Return a luminance relative to white (height, width) with the acuity and noise of rods."""
+    # slow to load
+    from scipy.ndimage import gaussian_filter
+
+    narrow, wide = (
+        gaussian_filter(relative, sigma, mode="nearest")
+        for sigma in (look.blur_px, _WIDER * look.blur_px)
+    )
+    edge = narrow - wide
+    noise = np.random.default_rng(look.seed).normal(0.0, look.noise, relative.shape)
+    seen = wide + np.sign(edge) * np.abs(edge) ** (1 / look.sharpening) + noise
+    return np.maximum(seen, 0.0)
+
 
 Bytes = NDArray[np.uint8]
 

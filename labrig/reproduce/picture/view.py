@@ -15,7 +15,7 @@ from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
 from labrig.foundation.errors import UsageError
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.surface.surface_material import SurfaceMaterial
-from labrig.reproduce.transport.colour_folding import Sequences
+from labrig.reproduce.transport.folding import Sequences
 from labrig.reproduce.transport.geometry import Surface
 from labrig.reproduce.transport.lamp import LampTable
 from labrig.reproduce.transport.tracing import Paths, Tracer

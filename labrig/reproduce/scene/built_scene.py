@@ -1,7 +1,8 @@
-"""A scene ready to be rendered: its file with materials, meshes and lamps in place."""
+"""A scene ready to be rendered: materials, meshes and lamps of its file, in bands and in place."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Self
 
@@ -11,26 +12,203 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import beside
 from labrig.foundation.yaml_file import did_you_mean, validate
-from labrig.optics import Spectrum, read_light
+from labrig.material import Albedo, Material, read_any_material, read_mixture
+from labrig.optics import (
+    Spectrum,
+    Transmittance,
+    absolute_irradiance,
+    read_colour_chart,
+    read_light,
+    read_transmittance,
+)
+from labrig.reproduce.scene.entries import STRENGTHS, LampEntry
 from labrig.reproduce.scene.placed_objects import surface_over_time
 from labrig.reproduce.scene.scene_file import (
+    AlbedoCurve,
     DisplayEntry,
+    MaterialEntry,
     ProgrammeEntry,
     SceneFile,
     read_scene,
 )
-from labrig.reproduce.scene.scene_lamps import bench_light, placed_lamp
-from labrig.reproduce.scene.scene_materials import (
-    NOTHING_ASSUMED,
-    Assumptions,
-    replaced_entries,
-    scene_material,
-)
 from labrig.reproduce.surface.bands import Bands
-from labrig.reproduce.surface.surface_material import BenchLight, SurfaceMaterial
+from labrig.reproduce.surface.parameter_texture import read_parameter_texture
+from labrig.reproduce.surface.surface_material import (
+    BenchLight,
+    SurfaceMaterial,
+    of_albedo,
+    of_matrix,
+    of_mixture,
+    of_phosphor,
+)
 from labrig.reproduce.transport.geometry import Geometry, Surface
 from labrig.reproduce.transport.lamp import Lamp
 from labrig.reproduce.transport.tracing import PathLength, Pinhole
+
+#: Part of a lamp's brightest band by which noise may make another negative.
+NOISE_OF_LAMP = 0.01
+
+
+def bench_light(file: SceneFile, folder: Path) -> BenchLight:
+    """Return the light by which phosphors of a scene were measured."""
+    light = file.bench_light
+    spectrum = read_light(beside(light.spectrum, folder))
+    return BenchLight(absolute_irradiance(light.illuminance_lux, spectrum))
+
+
+def placed_lamp(name: str, entry: LampEntry, bands: Bands, folder: Path, t_s: float) -> Lamp:
+    """Return a lamp at a time in s, at its full strength."""
+    of_eye, of_watt = STRENGTHS[entry.kind]
+    strength = getattr(entry, of_eye)
+    is_to_eye = strength is not None
+    unit = _unit_light(beside(entry.spectrum, folder), bands, is_to_eye)
+    if unit.min() < -NOISE_OF_LAMP * unit.max():
+        worst = bands.centre_nm[int(np.argmin(unit))]
+        raise UsageError(
+            f"lamp {name}: expected a spectrum ≥ 0, got a negative one at {worst:g} nm in "
+            f"'{entry.spectrum}'"
+        )
+    unit = np.maximum(unit, 0.0)
+    light = unit * (strength if is_to_eye else getattr(entry, of_watt))
+    if not light.any() and strength != 0:
+        raise UsageError(
+            f"lamp {name}: expected light between {bands.edges_nm[0]:g} and "
+            f"{bands.edges_nm[-1]:g} nm, got none in '{entry.spectrum}'"
+        )
+    vector = entry.position_m or (0.0, 0.0, 1.0)
+    if entry.path is not None:
+        times = [point.at_s for point in entry.path]
+        places = np.array([point.position_m for point in entry.path])
+        x, y, z = (float(np.interp(t_s, times, column)) for column in places.T)
+        vector = x, y, z
+    if entry.towards is not None:
+        x, y, z = (np.array(entry.towards) / np.linalg.norm(entry.towards)).tolist()
+        vector = x, y, z
+    return Lamp(name, entry.kind, light, vector)
+
+
+@lru_cache(maxsize=64)
+def _unit_light(named: str, bands: Bands, is_to_eye: bool) -> FloatArray:
+    """Return a spectrum in the bands of one scene, of 1 lm or of 1 W; read once for all times."""
+    spectrum = read_light(named)
+    if is_to_eye:
+        return absolute_irradiance(1.0, spectrum).in_bands(bands.edges_nm)
+    whole = float(np.trapezoid(spectrum.value, spectrum.wavelength_nm))
+    if not whole > 0:
+        raise UsageError(f"{named}: expected the spectrum of a lamp, got one without light")
+    return np.asarray(bands.means(spectrum) / whole)
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Assumptions that replace a measurement that is missing.
+
+    Attributes
+    ----------
+    albedo
+        Albedo of phosphors whose file has none.
+    scale
+        Factor from Λ to s sr⁻¹ of phosphors whose file has none.
+    """
+
+    albedo: float | None = None
+    scale: float | None = None
+
+
+NOTHING_ASSUMED = Assumptions()
+
+
+def replaced_entries(
+    entries: Mapping[str, MaterialEntry], replaced: Mapping[str, str], folder: Path
+) -> dict[str, tuple[MaterialEntry, Path]]:
+    """Return entries with the folders of their files, those replaced by the user's."""
+    if unknown := set(replaced) - set(entries):
+        raise UsageError(
+            f"expected a material of the scene ({', '.join(entries)}), got '{min(unknown)}'"
+        )
+    return {
+        name: (
+            (
+                entry.model_copy(
+                    update={
+                        "file": replaced[name],
+                        "albedo": None,
+                        "chart_patch": None,
+                        "mixture": None,
+                        "texture": None,
+                    }
+                ),
+                Path(),
+            )
+            if name in replaced
+            else (entry, folder)
+        )
+        for name, entry in entries.items()
+    }
+
+
+def scene_material(
+    name: str,
+    entry: MaterialEntry,
+    folder: Path,
+    bands: Bands,
+    bench: BenchLight,
+    assumptions: Assumptions,
+) -> SurfaceMaterial:
+    stored = None if entry.mixture is None else read_mixture(folder / entry.mixture)
+    albedo = _reflectance(entry, folder)
+    if albedo is not None:
+        if stored is None or not entry.is_fluorescent:
+            return of_albedo(name, albedo, bands)
+        return of_mixture(name, stored, albedo, bands)
+    assert entry.file is not None
+    material = read_any_material(beside(entry.file, folder))
+    if stored is not None:
+        if isinstance(material, Material):
+            raise UsageError(
+                f"{name}: expected 'file' to be a measured matrix, whose reflectance the 'mixture' "
+                f"needs, got the phosphor {material.name}"
+            )
+        if entry.is_fluorescent:
+            return _named(name, of_mixture(material.name, stored, material, bands))
+    if not isinstance(material, Material):
+        if entry.texture is not None:
+            raise UsageError(
+                f"{name}: expected a phosphor for 'texture', got the matrix {material.name}"
+            )
+        if not entry.is_fluorescent:
+            material = replace(material, reradiation=np.zeros_like(material.reradiation))
+        return _named(name, of_matrix(material, bands))
+    assumed, scale = entry.assume_albedo, entry.assume_scale
+    phosphor = of_phosphor(
+        material,
+        bands,
+        bench,
+        assumed if assumptions.albedo is None else assumptions.albedo,
+        scale if assumptions.scale is None else assumptions.scale,
+        entry.prompt,
+        None if entry.texture is None else read_parameter_texture(folder / entry.texture),
+    )
+    return _named(name, phosphor)
+
+
+def _reflectance(entry: MaterialEntry, folder: Path) -> Albedo | Transmittance | float | None:
+    """Return the reflectance that a scene gives a material, None of one that its file has."""
+    if entry.chart_patch is not None:
+        return read_colour_chart("colorchecker")[entry.chart_patch - 1]
+    if isinstance(entry.albedo, str):
+        return read_transmittance(beside(entry.albedo, folder))
+    if isinstance(entry.albedo, AlbedoCurve):
+        return Albedo(**entry.albedo.model_dump())
+    return entry.albedo
+
+
+def _named(name: str, material: SurfaceMaterial) -> SurfaceMaterial:
+    """Return a material with its name in the scene before its own."""
+    if name == material.name:
+        return material
+    return replace(material, name=f"{name} ({material.name})")
+
 
 #: White of a screen in sRGB.
 SCREEN_WHITE = "D65"

@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from labrig.foundation.region import Region
-from labrig.reproduce.scene.lamp_entry import LampEntry
-from labrig.reproduce.scene.object_entry import ObjectEntry, RectangleEntry
+from labrig.reproduce.scene.entries import LampEntry, ObjectEntry, RectangleEntry
 from labrig.reproduce.scene.scene_file import (
     BandsEntry,
     BenchLightEntry,

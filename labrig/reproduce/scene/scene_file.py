@@ -9,9 +9,15 @@ from pydantic import Field, model_validator
 from labrig.foundation import resources
 from labrig.foundation.models import NotNegative, Positive
 from labrig.foundation.yaml_file import did_you_mean, read_model
-from labrig.reproduce.scene.lamp_entry import LampEntry
-from labrig.reproduce.scene.object_entry import ObjectEntry
-from labrig.reproduce.scene.scene_part import Count, Name, ScenePart, Time, Vector
+from labrig.reproduce.scene.entries import (
+    Count,
+    LampEntry,
+    Name,
+    ObjectEntry,
+    ScenePart,
+    Time,
+    Vector,
+)
 
 FileName = Annotated[str, Field(pattern=r"^\w[\w .-]*$")]
 

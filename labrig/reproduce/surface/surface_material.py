@@ -18,7 +18,7 @@ from labrig.material import (
 )
 from labrig.optics import Spectrum, Transmittance, edges_from_centres
 from labrig.reproduce.surface.bands import Bands
-from labrig.reproduce.surface.field_parameters import FieldParameters
+from labrig.reproduce.surface.field import FieldParameters
 from labrig.reproduce.surface.parameter_texture import ParameterTexture
 
 #: Negative re-radiation, as a part of the light of a band, that is told, and that is refused.

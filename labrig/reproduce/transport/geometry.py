@@ -10,8 +10,13 @@ import numpy as np
 from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
 from labrig.foundation.errors import UsageError
 from labrig.reproduce.transport.mesh import Mesh
-from labrig.reproduce.transport.start_points import OnParticles, OnTexels, OnVertices, StartPoints
-from labrig.reproduce.transport.texel_map import TexelMap
+from labrig.reproduce.transport.start_points import (
+    OnParticles,
+    OnTexels,
+    OnVertices,
+    StartPoints,
+    TexelMap,
+)
 
 #: How states lie on a surface: none of its own, texels (columns, rows), its vertices, or one for
 #: each of the particles that its mesh consists of.

@@ -1,26 +1,8 @@
-"""Times of rows: clocks in a column, units and widths of channels in lines about the table."""
+"""Times of rows: clocks in a column, units and widths of channels in lines about the table.
 
-from labrig.text_table.times.clock_reading import ClockReading, parse_clock
-from labrig.text_table.times.clock_times import ClockTimes, is_clock_form, read_clock
-from labrig.text_table.times.statements import (
-    ChannelWidth,
-    axis_times_s,
-    axis_unit,
-    channel_width,
-    parse_width,
-    quoted,
-)
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "ChannelWidth",
-    "ClockReading",
-    "ClockTimes",
-    "axis_times_s",
-    "axis_unit",
-    "channel_width",
-    "is_clock_form",
-    "parse_clock",
-    "parse_width",
-    "quoted",
-    "read_clock",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,11 +3,15 @@
 What one cell leaves open (which number is the day, whether `12:05` are hours or minutes) is told by
 all rows together, by the header or by the user, or refused. Differences are exact: they are taken
 between whole numbers of the last digit.
+
+Time itself does not go back. A clock without a date begins again each day; one with summer time is
+set by an hour, which the spacing of the rows around it proves. A clock that goes back for another
+reason was set by hand, and nothing tells by how much.
 """
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from itertools import pairwise
 from statistics import median
@@ -16,8 +20,345 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.foundation.errors import UsageError
-from labrig.text_table.times.clock_jumps import Clock, continuous
-from labrig.text_table.times.clock_reading import ClockReading, full_year, parse_clock
+
+_HOUR_S, _HALF_DAY_S, _DAY_S = 3600, 43200, 86400
+#: Rows before and after a jump whose spacing proves it, and the fewest of them.
+_NEIGHBOURS, _FEWEST = 10, 4
+#: Longest row spacing from which a jump of an hour stands out.
+_LONGEST_SPACING_S = 3600
+#: Largest spacing over the smallest one of regular rows.
+_REGULAR_SHARE = 3.0
+
+#: Hours that are left out, or counted twice, in some country, and the months of it.
+_NIGHT_H = range(4)
+
+_CHANGE_MONTHS = frozenset({2, 3, 4, 9, 10, 11})
+
+_SUNDAY = 6
+#: More jumps ahead by an hour than this are the pauses of a schedule.
+_MOST_JUMPS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Readings of a clock in the order of time.
+
+    Attributes
+    ----------
+    ticks, per_s
+        Readings in units of their last digit, and how many of them are a second; with dates from
+        the calendar's beginning.
+    resolution_s
+        Last digit that is shown, in seconds.
+    cells, lines
+        Text and line of each reading.
+    wrap_s
+        Seconds after which the clock begins again; 0 if it does not.
+    has_dates
+        Whether the day of each reading is known.
+    is_absolute
+        Whether the readings are in UTC, which has no summer time.
+    could_be_12_hour
+        Whether all hours are from 1 to 12, with nothing that tells the half of the day.
+    form
+        What was found about the clock, in words.
+    warnings
+        Jumps, and what was done about them.
+    """
+
+    ticks: Sequence[int]
+    per_s: int
+    resolution_s: float
+    cells: Sequence[str]
+    lines: Sequence[int]
+    wrap_s: int
+    has_dates: bool
+    is_absolute: bool
+    could_be_12_hour: bool
+    form: str = ""
+    warnings: tuple[str, ...] = ()
+
+
+def continuous(clock: Clock) -> Clock:
+    """Return the clock without jumps; one that goes back for no known reason is refused.
+
+    Raises
+    ------
+    UsageError
+        The clock goes back, and neither midnight nor summer time explains it.
+    """
+    if clock.could_be_12_hour:
+        clock = _with_24_hours(clock)
+    if clock.wrap_s:
+        clock = _past_wraps(clock)
+    return clock if clock.is_absolute else _without_summer_time(clock)
+
+
+def _with_24_hours(clock: Clock) -> Clock:
+    """Return a clock that goes from 12:59 to 1:00 as one that begins again after 12 hours."""
+    steps = _steps(clock.ticks)
+    if not any(
+        step < 0 and _is_regular(clock, steps, row, step + _HALF_DAY_S * clock.per_s)
+        for row, step in enumerate(steps)
+    ):
+        return clock
+    half_day = _HALF_DAY_S * clock.per_s
+    return replace(
+        clock,
+        ticks=[tick % half_day for tick in clock.ticks],
+        wrap_s=_HALF_DAY_S,
+        form="12-hour without AM and PM",
+    )
+
+
+def _past_wraps(clock: Clock) -> Clock:
+    """Return the clock with a day (an hour of a stopwatch) added where it begins again."""
+    wrap = clock.wrap_s * clock.per_s
+    ticks, wraps = [clock.ticks[0]], 0
+    for step, tick in zip(_steps(clock.ticks), clock.ticks[1:], strict=True):
+        wraps += 2 * step < -wrap
+        ticks.append(tick + wraps * wrap)
+    return replace(clock, ticks=ticks)
+
+
+def _without_summer_time(clock: Clock) -> Clock:
+    steps = _steps(clock.ticks)
+    hour = _HOUR_S * clock.per_s
+    ahead = [row for row, step in enumerate(steps) if _is_regular(clock, steps, row, step - hour)]
+    shift, shifts, warnings = 0, [0], []
+    for row, step in enumerate(steps):
+        from_to = (
+            f"line {clock.lines[row + 1]}: the clock goes {'ahead' if step > 0 else 'back'} from "
+            f"{clock.cells[row].strip()} to {clock.cells[row + 1].strip()}"
+        )
+        is_repeated_hour = step == 0 and clock.has_dates and _is_night_of_change(clock, row + 1)
+        if (step < 0 or is_repeated_hour) and _is_regular(clock, steps, row, step + hour):
+            shift += hour
+            warnings.append(
+                f"{from_to}, by an hour as at the end of summer time: the spacing of the rows "
+                "shows it, and an hour was added from there on"
+            )
+        elif step < 0:
+            _refuse_backward(clock, row, from_to)
+        elif row in ahead and _crosses_summer_time(clock, row):
+            shift -= hour
+            warnings.append(
+                f"{from_to}, by an hour as at the begin of summer time: the spacing of the rows "
+                "shows it, and an hour was taken off from there on"
+            )
+        elif row in ahead and len(ahead) <= _MOST_JUMPS:
+            warnings.append(
+                f"{from_to}, by just an hour more than the rows around it: it is taken for a "
+                "pause; if the clock was set, take the hour off the times that follow"
+            )
+        shifts.append(shift)
+    ticks = [tick + by for tick, by in zip(clock.ticks, shifts, strict=True)]
+    return replace(clock, ticks=ticks, warnings=(*clock.warnings, *warnings))
+
+
+def _refuse_backward(clock: Clock, row: int, from_to: str) -> None:
+    """Refuse a clock that goes back, unless its dates tell the order of the rows."""
+    step = clock.ticks[row + 1] - clock.ticks[row]
+    is_within_an_hour = step > -_HOUR_S * clock.per_s
+    if clock.has_dates and not (is_within_an_hour and _is_night_of_change(clock, row + 1)):
+        return
+    raise UsageError(
+        f"{from_to}, and the spacing of the rows does not tell why: did summer time end, or was it "
+        "set? Write the times with their offset from UTC (2026-10-25 02:00:00+01:00), or as "
+        "seconds"
+    )
+
+
+def _steps(ticks: Sequence[int]) -> list[int]:
+    return [after - before for before, after in pairwise(ticks)]
+
+
+def _is_regular(clock: Clock, steps: Sequence[int], row: int, step: int) -> bool:
+    """Return whether `step` is like the steps around row `row`, which are regular."""
+    near = [*steps[max(row - _NEIGHBOURS, 0) : row], *steps[row + 1 : row + 1 + _NEIGHBOURS]]
+    longest = _LONGEST_SPACING_S * clock.per_s
+    near = [other for other in near if 0 <= other <= longest]
+    if len(near) < _FEWEST:
+        return False
+    low, high = min(near), max(near)
+    shown = clock.resolution_s * clock.per_s
+    margin = high - low + shown
+    return (
+        high <= _REGULAR_SHARE * low + 2 * shown and max(low - margin, 0) <= step <= high + margin
+    )
+
+
+def _crosses_summer_time(clock: Clock, row: int) -> bool:
+    """Return whether an hour is left out after row `row` that summer time may leave out."""
+    day = _DAY_S * clock.per_s
+    before, after = clock.ticks[row], clock.ticks[row + 1]
+    begin = after // day * day
+    hour = _HOUR_S * clock.per_s
+    leaves_out = any(
+        before < begin + number * hour and begin + (number + 1) * hour <= after
+        for number in _NIGHT_H
+    )
+    return leaves_out and (not clock.has_dates or _is_night_of_change(clock, row + 1))
+
+
+def _is_night_of_change(clock: Clock, row: int) -> bool:
+    """Return whether clocks are set somewhere in the night of a row with a date."""
+    days, ticks = divmod(clock.ticks[row], _DAY_S * clock.per_s)
+    on = date.fromordinal(days)
+    is_night = ticks < (len(_NIGHT_H) + 1) * _HOUR_S * clock.per_s
+    return is_night and on.weekday() == _SUNDAY and on.month in _CHANGE_MONTHS
+
+
+_HOURS_OF_HALF_DAY = 12
+#: First of the two-digit years that belong to the last century, as in POSIX.
+_PIVOT_YEAR = 69
+
+#: First letters of the months' names in English, German and French.
+_MONTHS = {
+    letters: number
+    for number, names in enumerate(
+        (
+            "jan", "feb fév fev", "mar mär mrz", "apr avr", "may mai", "jun juin", "jul juil",
+            "aug aoû aou", "sep", "oct okt", "nov", "dec dez déc",
+        ),
+        start=1,
+    )
+    for letters in names.split()
+}  # fmt: skip
+#: Hours ahead of UTC by the names that clocks print; where one changes, summer time does.
+_ZONES_H = {
+    "Z": 0, "UTC": 0, "UT": 0, "GMT": 0, "WET": 0, "WEST": 1, "BST": 1, "CET": 1, "MEZ": 1,
+    "CEST": 2, "MESZ": 2, "EET": 2, "EEST": 3, "MSK": 3, "JST": 9, "EST": -5, "EDT": -4,
+    "CST": -6, "CDT": -5, "MST": -7, "MDT": -6, "PST": -8, "PDT": -7,
+}  # fmt: skip
+
+_WEEKDAY = re.compile(r"[^\W\d_]{2,10}\.?,?\s+(?=\d)")
+#: As C's `ctime` and the shell's `date` print it: `Sat Oct 24 23:59:30 CEST 2026`.
+_YEAR_LAST = re.compile(r"([^\W\d_]{3} \d{1,2}) (\d\d?:\d\d:\d\d\S*(?: [A-Z]{3,4})?) (\d{4})")
+_NAMED_MONTH = re.compile(
+    r"(?:(?P<d>\d{1,2})\.?[\s\-/]*(?P<m>[^\W\d_]{3,9})\.?[\s,\-/]+"
+    r"|(?P<m2>[^\W\d_]{3,9})\.?\s+(?P<d2>\d{1,2}),?\s+)(?P<y>\d{4}|\d\d(?!:))(?!\d)"
+)
+_BASIC = re.compile(r"(\d{8})[T_](\d\d)(\d\d)(\d\d)")
+#: `20261024235930`, which no count of seconds reaches.
+_DIGITS = re.compile(
+    r"((?:19|20)\d\d(?:0[1-9]|1[0-2])(?:0[1-9]|[12]\d|3[01]))([01]\d|2[0-3])([0-5]\d)([0-5]\d)"
+)
+_DATE = r"(?P<d1>\d{4}|\d\d?)(?P<mark>[-/.])(?P<d2>\d\d?)(?P=mark)(?P<d3>\d{4}|\d\d?)\.?"
+_ANY_DATE = rf"(?:{_DATE}|(?P<compact>\d{{8}}))"
+_TIME = (
+    r"(?P<a>\d{1,3}):(?P<b>[0-5]\d)"
+    r"(?::(?P<c>[0-5]\d)(?:[.,](?P<f>\d*)|:(?P<ms>\d{3}))?|[.,](?P<g>\d+))?"
+    r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\.?)?(?:\s*(?:Uhr|h))?"
+)
+_ZONE = (
+    r"(?:\s*(?P<zone>Z|UTC|UT|GMT|[A-Z]{3,4})?(?P<offset>[+\-]\d\d?(?::?\d\d)?)?(?:\[[\w/]+\])?)?"
+)
+_FORMS = (
+    re.compile(rf"(?:{_ANY_DATE}(?:T|[\s,;_]+|[-:](?=\d\d?:)))?{_TIME}{_ZONE}"),
+    re.compile(rf"{_TIME}{_ZONE}[\s,;]+{_ANY_DATE}"),
+    re.compile(_DATE),
+)
+
+
+@dataclass(frozen=True)
+class ClockReading:
+    """Content of a cell with a clock, before it is known which number is which.
+
+    Attributes
+    ----------
+    date
+        Its three numbers as they are written; empty without a date.
+    parts
+        Two or three numbers of the time; empty where only a date is given, which is midnight.
+    fraction
+        Digits of the fraction of the last part.
+    half
+        `a` or `p` of a 12-hour clock; empty for one of 24 hours.
+    offset_s
+        Seconds ahead of UTC; None if the cell does not say it.
+    zone
+        Name of a zone whose offset is not known.
+    """
+
+    date: tuple[str, ...]
+    parts: tuple[int, ...]
+    fraction: str
+    half: str
+    offset_s: int | None
+    zone: str
+
+
+def parse_clock(cell: str) -> ClockReading | None:
+    """Return what a cell with a clock says; None if it is none.
+
+    Examples
+    --------
+    >>> from labrig.text_table.times.clock_times import parse_clock
+    >>> reading = parse_clock("24.10.2026 11:59:30,5 PM")
+    >>> reading.date, reading.parts, reading.fraction, reading.half
+    (('24', '10', '2026'), (11, 59, 30), '5', 'p')
+    >>> parse_clock("995.679") is None
+    True
+    """
+    text = " ".join(cell.replace("\N{MINUS SIGN}", "-").split())
+    if digits := _DIGITS.fullmatch(text):
+        text = "{} {}:{}:{}".format(*digits.groups())
+    text = _YEAR_LAST.sub(r"\1, \3 \2", _BASIC.sub(r"\1 \2:\3:\4", text))
+    text = _WEEKDAY.sub("", _NAMED_MONTH.sub(_as_iso, text, count=1), count=1)
+    for form in _FORMS:
+        if match := form.fullmatch(text):
+            return _reading(match.groupdict())
+    return None
+
+
+def full_year(text: str) -> int:
+    """Return the year that two or four digits stand for."""
+    year = int(text)
+    if len(text) > len("yy"):
+        return year
+    return year + (1900 if year >= _PIVOT_YEAR else 2000)
+
+
+def _as_iso(match: re.Match[str]) -> str:
+    """Return a date with the name of its month in the order year, month, day."""
+    month = (match["m"] or match["m2"]).lower()
+    number = _MONTHS.get(month[:4]) or _MONTHS.get(month[:3])
+    if number is None:
+        return match[0]
+    return f"{full_year(match['y']):04d}-{number:02d}-{int(match['d'] or match['d2']):02d}"
+
+
+def _reading(found: dict[str, str | None]) -> ClockReading | None:
+    compact = found.get("compact")
+    date = tuple(found[name] or "" for name in ("d1", "d2", "d3")) if found["d1"] else ()
+    if compact:
+        date = (compact[:4], compact[4:6], compact[6:])
+    parts = tuple(int(found[name] or 0) for name in "abc" if found.get(name) is not None)
+    half = (found.get("half") or "").lower()
+    if half and parts[0] > _HOURS_OF_HALF_DAY:
+        return None
+    zone, offset = found.get("zone") or "", found.get("offset") or ""
+    hours = _ZONES_H.get(zone)
+    offset_s = None if hours is None and (zone or not offset) else 3600 * (hours or 0)
+    if offset and offset_s is not None:
+        offset_s += _seconds(offset)
+    return ClockReading(
+        date=date,
+        parts=parts,
+        fraction=found.get("f") or found.get("ms") or found.get("g") or "",
+        half=half,
+        offset_s=offset_s,
+        zone=zone if hours is None else "",
+    )
+
+
+def _seconds(offset: str) -> int:
+    """Return the seconds of an offset from UTC such as `+02:00` or `-0530`."""
+    digits = offset[1:].replace(":", "")
+    hours, minutes = (int(digits[:-2]), int(digits[-2:])) if len(digits) > 2 else (int(digits), 0)
+    return (-1 if offset[0] == "-" else 1) * (3600 * hours + 60 * minutes)
+
 
 SECONDS_A_DAY = 86400
 _HALF_DAY_H, _DAY_H = 12, 24

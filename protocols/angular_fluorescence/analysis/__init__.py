@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.protocols.angular_fluorescence.analysis.sphere import sphere_views
 from labrig.protocols.angular_fluorescence.analysis.yarn import yarn_views
 from labrig.protocols.angular_fluorescence.result import (
@@ -16,7 +16,7 @@ from labrig.protocols.angular_fluorescence.result import (
 MUCH_REFLECTED = 0.1
 
 
-def analyse(part: Part) -> AngularFluorescenceResult:
+def analyse(context: AnalysisContext) -> AngularFluorescenceResult:
     """Test whether re-radiation depends on angle.
 
     Raises
@@ -26,11 +26,11 @@ def analyse(part: Part) -> AngularFluorescenceResult:
     UsageError
         The channels cannot be chosen.
     """
-    if part.protocol.shape == "sphere":
-        spheres, warnings = sphere_views(part)
+    if context.protocol.shape == "sphere":
+        spheres, warnings = sphere_views(context)
         result = AngularFluorescenceResult(spheres=spheres)
     else:
-        yarns, warnings = yarn_views(part)
+        yarns, warnings = yarn_views(context)
         result = AngularFluorescenceResult(yarns=yarns)
     lines = (*warnings, *dict.fromkeys(_warnings(result)))
     return AngularFluorescenceResult(

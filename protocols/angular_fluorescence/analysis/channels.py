@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labrig.acquire import RigFile, led_lights
+from labrig.acquire import LEDS, RigFile, bank_lights
 from labrig.bench_optics import camera_curves
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
@@ -28,7 +28,7 @@ def led_response(
     It is 0 of an LED that the camera does not see, and None if the rig file does not say the
     curves of camera and LED.
     """
-    light = led_lights(rig, "rig.yaml").get(led)
+    light = bank_lights(rig, LEDS.key, "rig.yaml").get(led)
     spectrum = None if light is None else light.relative_spectrum()
     if spectrum is None or (rig.optics.camera is None and instead is None):
         return None

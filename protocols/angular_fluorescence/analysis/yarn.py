@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera, untimed
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND
 from labrig.fit.angular import fit_dependence
 from labrig.foundation.arrays import FloatArray
@@ -40,7 +40,7 @@ class View:
     sigma: FloatArray
 
 
-def yarn_views(part: Part) -> tuple[tuple[YarnViews, ...], list[str]]:
+def yarn_views(context: AnalysisContext) -> tuple[tuple[YarnViews, ...], list[str]]:
     """Return the views of each LED and direction with their tests, and warnings.
 
     Raises
@@ -50,8 +50,8 @@ def yarn_views(part: Part) -> tuple[tuple[YarnViews, ...], list[str]]:
     UsageError
         The channels cannot be chosen.
     """
-    views, warnings = _views(part)
-    protocol = part.protocol
+    views, warnings = _views(context)
+    protocol = context.protocol
     level = LEVEL / (len(protocol.leds) * len(protocol.directions))
     tested, refused = [], []
     for led in protocol.leds:
@@ -60,7 +60,7 @@ def yarn_views(part: Part) -> tuple[tuple[YarnViews, ...], list[str]]:
             lit, dark = _lit(own)
             warnings += dark
             try:
-                tested.append(_tested(part, lit, led, direction, level))
+                tested.append(_tested(context, lit, led, direction, level))
             except DataError as error:
                 refused.append(f"{direction} under {led}: {error}")
     if not tested:
@@ -68,12 +68,12 @@ def yarn_views(part: Part) -> tuple[tuple[YarnViews, ...], list[str]]:
     return tuple(tested), [*warnings, *refused]
 
 
-def _views(part: Part) -> tuple[list[View], list[str]]:
+def _views(context: AnalysisContext) -> tuple[list[View], list[str]]:
     """Return all complete views, and a warning about each group of others."""
-    on, off = (_series(part, role) for role in AngularFrames)
+    on, off = (_series(context, role) for role in AngularFrames)
     units_on, units_off = grouped(on.unit), grouped(off.unit)
     views, clipped, missing = [], [], []
-    for pose in part.protocol.poses():
+    for pose in context.protocol.poses():
         if pose.unit not in units_on or pose.unit not in units_off:
             missing.append(pose.unit)
             continue
@@ -87,7 +87,7 @@ def _views(part: Part) -> tuple[list[View], list[str]]:
     warnings = []
     if missing:
         warnings.append(
-            f"{len(missing)} of {len(part.protocol.poses())} views are missing "
+            f"{len(missing)} of {len(context.protocol.poses())} views are missing "
             f"({_named(missing)}); the others are used (go on with labrig resume)"
         )
     if clipped:
@@ -98,14 +98,15 @@ def _views(part: Part) -> tuple[list[View], list[str]]:
     return views, warnings
 
 
-def _series(part: Part, role: AngularFrames) -> Series:
-    frames = part_frames(part, role)
-    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, frames)
+def _series(context: AnalysisContext, role: AngularFrames) -> Series:
+    frames = part_frames(context, role)
+    require_calibrated_camera(context.inputs[CAMERA_KIND], context.run, frames)
     if not frames:
         raise DataError(
-            f"{part.run.folder}: no view is complete; go on with: labrig resume {part.run.folder}"
+            f"{context.run.folder}: no view is complete; go on with: "
+            f"labrig resume {context.run.folder}"
         )
-    region = part_region(part, part.protocol.region)
+    region = part_region(context, context.protocol.region)
     return reduce_series([untimed(frame) for frame in frames], region)
 
 
@@ -132,14 +133,16 @@ def _lit(views: Sequence[View]) -> tuple[list[View], list[str]]:
     return [view for view, lit in zip(views, is_lit, strict=True) if lit], [line]
 
 
-def _tested(part: Part, views: Sequence[View], led: str, direction: str, level: float) -> YarnViews:
+def _tested(
+    context: AnalysisContext, views: Sequence[View], led: str, direction: str, level: float
+) -> YarnViews:
     if not views:
         raise DataError("no view is lit and complete")
     channels = views[0].channels
     signal = np.mean([view.value for view in views], axis=0)
-    response = led_response(part.rig, led, channels, part.overrides.camera)
+    response = led_response(context.rig, led, channels, context.overrides.camera)
     limits = reflected_at_most(signal, response)
-    chosen = chosen_channels(part.protocol.channels, channels, "re-radiated", limits, response)
+    chosen = chosen_channels(context.protocol.channels, channels, "re-radiated", limits, response)
     angle_deg = np.array([view.pose.angle_deg for view in views], dtype=np.float64)
     values = np.array([view.value for view in views])
     reflected, reflected_sigma = reflected_signal(values, response, chosen)

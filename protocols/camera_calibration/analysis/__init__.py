@@ -7,17 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.analyse.frames import lens_of, part_frames, part_region, timed, untimed
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CameraFile, Linearity
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.number_format import exposure_text, plus_minus
 from labrig.foundation.region import Region
-from labrig.protocols.camera_calibration.analysis.bend import Bend, fit_bend
 from labrig.protocols.camera_calibration.analysis.factors import CardFrame, Factors, fit_factors
-from labrig.protocols.camera_calibration.analysis.flat_field import fit_flat
-from labrig.protocols.camera_calibration.analysis.glare import measure_glare
-from labrig.protocols.camera_calibration.analysis.linearity import deviation, fit_linearity
+from labrig.protocols.camera_calibration.analysis.flat_field import fit_flat, measure_glare
+from labrig.protocols.camera_calibration.analysis.linearity import (
+    Bend,
+    deviation,
+    fit_bend,
+    fit_linearity,
+)
 from labrig.protocols.camera_calibration.analysis.photon_transfer import (
     MeasurePair,
     Pair,
@@ -47,7 +50,7 @@ MUCH_GLARE = 0.03
 CLEAR_SIGMAS = 4.0
 
 
-def analyse(part: Part) -> CameraCalibrationResult:
+def analyse(context: AnalysisContext) -> CameraCalibrationResult:
     """Measure noise, linearity, factors of settings and flat fields.
 
     Raises
@@ -55,10 +58,10 @@ def analyse(part: Part) -> CameraCalibrationResult:
     DataError
         Some unit is missing, or its frames are unusable.
     """
-    protocol, run = part.protocol, part.run
-    region, iso = part_region(part, protocol.card), protocol.camera.iso
-    darks = part_frames(part, FrameRole.DARK)
-    lit = part_frames(part, *LIT)
+    protocol, run = context.protocol, context.run
+    region, iso = part_region(context, protocol.card), protocol.camera.iso
+    darks = part_frames(context, FrameRole.DARK)
+    lit = part_frames(context, *LIT)
     card = card_levels(lit, darks, region)
     photon = [frame for frame in lit if frame.role == CardFrames.PHOTON]
     bracket = [frame for frame in lit if frame.unit == LINEARITY]
@@ -75,7 +78,7 @@ def analyse(part: Part) -> CameraCalibrationResult:
         iso,
         protocol.camera.f_number,
     )
-    flats = _fit_flats(part, lit, darks)
+    flats = _fit_flats(context, lit, darks)
     file = CameraFile(
         camera=run.camera_identity,
         lens=lens_of(lit),
@@ -93,7 +96,7 @@ def analyse(part: Part) -> CameraCalibrationResult:
         source="measured with labrig, camera_calibration",
         run=run.name,
     )
-    file = file.model_copy(update={"glare": measure_glare(part, file, lit, darks)})
+    file = file.model_copy(update={"glare": measure_glare(context, file, lit, darks)})
     return CameraCalibrationResult(
         calibration=file,
         card=card.series,
@@ -246,9 +249,9 @@ def _measure_pairs(
 
 
 def _fit_flats(
-    part: Part, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord]
+    context: AnalysisContext, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord]
 ) -> tuple[FittedFlat, ...]:
-    card, reference = part_region(part, part.protocol.card), part.protocol.camera.iso
+    card, reference = part_region(context, context.protocol.card), context.protocol.camera.iso
     dark_dn = _dark_levels([frame for frame in darks if frame.iso == reference], card)
     flat_frames = [frame for frame in lit if frame.role == CardFrames.FLAT]
     return tuple(

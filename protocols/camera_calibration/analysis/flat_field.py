@@ -1,4 +1,4 @@
-"""Vignetting of a lens at one aperture, from frames of an evenly lit card."""
+"""Vignetting of a lens at one aperture, from frames of an evenly lit card, and veiling glare."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,12 +8,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.analyse.frames import timed, untimed
+from labrig.analyse.inputs import AnalysisContext
+from labrig.calibration import CameraFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region, region_pixels
-from labrig.optics import Flat, rho_squared
+from labrig.optics import Flat, Glare, rho_squared
+from labrig.protocols.camera_calibration.protocol import CardFrames
 from labrig.protocols.camera_calibration.result import FittedFlat
-from labrig.reduce import LinearFrame, RawFrame, StoredFrame, reduce_frames
+from labrig.record import FrameRecord
+from labrig.reduce import (
+    FRAME_TILES,
+    LinearFrame,
+    RawFrame,
+    StoredFrame,
+    frame_series,
+    reduce_frames,
+    reduce_patches,
+)
 
 #: Blocks across and down the card whose means are fitted.
 BLOCKS = (16, 12)
@@ -153,3 +166,54 @@ def _fit_channel(
     return _ChannelFit(
         falloff, powers, gradient, float(np.sqrt(variance)) / middle, rho2, flat_light
     )
+
+
+BLACK = "black"
+#: Glare above which the trap is no trap.
+NOT_BLACK = 0.2
+
+
+def measure_glare(
+    context: AnalysisContext,
+    camera: CameraFile,
+    lit: Sequence[FrameRecord],
+    darks: Sequence[FrameRecord],
+) -> Glare | None:
+    """Return the signal of the trap over the frame's mean signal; None without a trap.
+
+    Parameters
+    ----------
+    part
+        Part of a run.
+    camera
+        The calibration without glare, whose flat fields are divided out.
+    lit, darks
+        Frames of the lit card, and dark frames.
+
+    Raises
+    ------
+    DataError
+        The place of the trap is not black.
+    """
+    black = context.protocol.black
+    if black is None:
+        return None
+    flats = [frame for frame in lit if frame.role == CardFrames.FLAT]
+    series = reduce_patches(
+        [timed(frame, flats[0].start_time) for frame in flats],
+        {BLACK: black, **FRAME_TILES},
+        [untimed(frame) for frame in darks],
+        camera=camera,
+    )
+    frame_light = frame_series([series[name] for name in FRAME_TILES]).values
+    fraction = series[BLACK].values / frame_light
+    dark_sigma = np.nan_to_num(series[BLACK].dark_sigma / frame_light.mean(axis=0))
+    # A lens's glare is not quite the same at all apertures and in all channels.
+    sigma = float(np.hypot(fraction.std(), dark_sigma.mean()))
+    mean = float(fraction.mean())
+    if mean > NOT_BLACK:
+        raise DataError(
+            f"black: expected a black trap, got {100 * mean:.0f} % of the frame's mean light "
+            "there; change black: or leave it out"
+        )
+    return Glare(fraction=max(mean, 0.0), sigma=sigma)

@@ -23,7 +23,7 @@ from labrig.calibration import Noise
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region, region_pixels
-from labrig.protocols.camera_calibration.analysis.bend import Bend, photon_terms
+from labrig.protocols.camera_calibration.analysis.linearity import Bend, photon_terms
 from labrig.protocols.camera_calibration.analysis.read_noise import (
     RESOLVED,
     NumberCounts,

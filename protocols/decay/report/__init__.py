@@ -1,18 +1,22 @@
-"""Report of a decay: results, sample, every patch, timing, and methods."""
+"""Report of a decay: results, sample, every patch, timing, and methods.
 
-from collections.abc import Mapping, Sequence
+These are statements, with the sizes, and no warnings: the room may have been steady, and the sample
+may have no such state.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from labrig.foundation.detection import DETECTION_SIGMA
-from labrig.protocols.decay.report.law_figure import law_figure
-from labrig.protocols.decay.report.outside_sigma import outside_sections, unrecorded_temperature
-from labrig.protocols.decay.report.periodogram_figure import (
+from labrig.protocols.decay.report.figures import (
+    law_figure,
     periodogram_figure,
+    residual_figure,
     residual_periodogram,
+    residuals,
 )
-from labrig.protocols.decay.report.residual_figures import residual_figure, residuals
 from labrig.protocols.decay.result import DecayResult
 from labrig.record import FrameRecord, FrameRole, RunDescription
 from labrig.report.colours import Screen, Swatch, screen_for, swatches
@@ -42,7 +46,42 @@ from labrig.report.timing import (
     frame_lateness,
     frame_timings,
 )
-from labrig.results import DecayPatch, FittedDecay, Series
+from labrig.results import DecayPatch, FittedDecay, ResultWithDecays, Series
+
+
+def unrecorded_temperature(result: ResultWithDecays) -> tuple[str, ...]:
+    """Return a sentence for each patch of which a drift of the temperature would matter."""
+    return _of_patches(result, _temperature)
+
+
+def outside_sections(result: ResultWithDecays) -> tuple[Section, ...]:
+    """Return the section with all statements of a decay; empty if there are none."""
+    unseen = _of_patches(result, lambda patch: patch.fit.outside_sigma if patch.fit else "")
+    flicker = _of_patches(result, lambda patch: str((patch.fit and patch.fit.unseen_flicker) or ""))
+    statements = (*unrecorded_temperature(result), *unseen, *flicker)
+    if not statements:
+        return ()
+    text = tuple(f"{line[0].upper()}{line[1:]}." for line in statements)
+    return (Section("Not in σ", text),)
+
+
+def _of_patches(result: ResultWithDecays, sentence: Callable[[DecayPatch], str]) -> tuple[str, ...]:
+    sentences = ((name, sentence(patch)) for name, patch in result.patches.items())
+    return tuple(
+        f"{name}: {text}" if len(result.patches) > 1 else text for name, text in sentences if text
+    )
+
+
+def _temperature(patch: DecayPatch) -> str:
+    if patch.drift_effect is None or patch.fit is None:
+        return ""
+    changes = patch.fit.describe_changes(*patch.drift_effect.T.tolist())
+    if not changes:
+        return ""
+    return (
+        "the temperature was not recorded: 1 K in an hour, with traps 0.65 eV deep, would change "
+        f"{changes}; a thermometer in the rig would tell"
+    )
 
 
 @dataclass(frozen=True)

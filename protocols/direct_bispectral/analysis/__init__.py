@@ -1,15 +1,19 @@
-"""From readings of white and samples under narrow-band lights to columns of a matrix."""
+"""From readings of white and samples under narrow-band lights to columns of a matrix.
+
+A pixel's own scatter over a few repetitions says little, but the noise of all pixels of all
+readings of a run follows one law: read noise, dark current, and shot noise of the light. What all
+pixels of a repetition share is the noise of the dark pixels, which are subtracted.
+"""
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from labrig.acquire import LEDS, RigFile
-from labrig.analyse.direct_columns import direct_columns
+from labrig.acquire import LEDS, RigFile, bank_lights
 from labrig.analyse.frames import require_intact
-from labrig.analyse.inputs import Part
+from labrig.analyse.hyperspectral import direct_columns
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import card_reflectance, filter_transmittances
 from labrig.fit.bispectral import (
     BispectralColumns as BispectralColumns,
@@ -21,6 +25,7 @@ from labrig.fit.bispectral import (
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.foundation.number_format import plus_minus
 from labrig.optics import SpectrometerReading, Spectrum, Transmittance, read_spectrometer_reading
 from labrig.protocols.direct_bispectral.analysis.checks import (
@@ -33,10 +38,79 @@ from labrig.protocols.direct_bispectral.analysis.checks import (
     second_peak,
     stray_in_column,
 )
-from labrig.protocols.direct_bispectral.analysis.noise import ReadingNoise, reading_noise
 from labrig.protocols.direct_bispectral.protocol import WHITE, DirectSpectra
 from labrig.protocols.direct_bispectral.result import DirectBispectralResult
 from labrig.results import DirectColumns, LightSpectrum, Measured
+
+#: Groups of pixels with similar light in a reading, whose variances are averaged.
+GROUPS = 24
+ITERATIONS = 3
+#: Part of the pixels of a reading with the least light, whose mean shows the common noise.
+DIM_PART = 0.25
+
+
+@dataclass(frozen=True)
+class ReadingNoise:
+    """Variances of one repetition, in counts².
+
+    Attributes
+    ----------
+    read
+        Variance of a pixel without light.
+    dark_per_s
+        What dark current adds in a second.
+    gain
+        Variance per count of light.
+    common
+        Variance of the offset that all pixels share.
+    """
+
+    read: float
+    dark_per_s: float
+    gain: float
+    common: float
+
+    def variance(self, counts: FloatArray, integration_s: float) -> FloatArray:
+        """Return the variance of pixels with these counts of light."""
+        return self.read + self.dark_per_s * integration_s + self.gain * np.maximum(counts, 0.0)
+
+
+def repetitions(reading: SpectrometerReading) -> FloatArray:
+    """Return the linear counts of each repetition, shape (repetitions, pixels)."""
+    return np.array(
+        [
+            replace(reading, raw_counts=counts[np.newaxis]).corrected().counts
+            for counts in reading.raw_counts
+        ]
+    )
+
+
+def reading_noise(readings: Sequence[SpectrometerReading]) -> ReadingNoise:
+    """Return the noise of an instrument by all readings of a run, two repetitions or more each."""
+    rows, variances, common, weights = [], [], [], []
+    for reading in readings:
+        linear = repetitions(reading)
+        usable = ~reading.saturated
+        usable[list(reading.dark_pixels)] = False
+        counts, scatter = linear.mean(axis=0)[usable], linear.var(axis=0, ddof=1)[usable]
+        order = np.argsort(counts)
+        for group in np.array_split(order, GROUPS):
+            rows.append((1.0, reading.integration_s, max(float(counts[group].mean()), 0.0)))
+            variances.append(float(scatter[group].mean()))
+        dim = order[: max(int(DIM_PART * len(order)), 1)]
+        together = linear[:, usable][:, dim].mean(axis=1).var(ddof=1)
+        common.append(together - scatter[dim].mean() / len(dim))
+        weights.append(len(linear) - 1)
+    design, target = np.array(rows), np.array(variances)
+    law = np.array([float(np.median(target)), 0.0, 0.0])
+    for _ in range(ITERATIONS):
+        # The scatter of a variance is proportional to it.
+        sigma = np.maximum(design @ law, 1e-12)
+        law = nonnegative_least_squares(design / sigma[:, np.newaxis], target / sigma)
+    shared = float(np.average(common, weights=weights))
+    read, dark_per_s, gain = law.tolist()
+    return ReadingNoise(read, dark_per_s, gain, max(shared, 0.0))
+
 
 #: Significance in σ of a drift, and of light from a sample.
 SIGNIFICANT = 5.0
@@ -62,7 +136,7 @@ class _Lit:
     window_nm: tuple[float, float] = (0.0, 0.0)
 
 
-def analyse(part: Part) -> DirectBispectralResult:
+def analyse(context: AnalysisContext) -> DirectBispectralResult:
     """Divide the light from every sample by that of the white reference, light by light.
 
     Raises
@@ -73,9 +147,11 @@ def analyse(part: Part) -> DirectBispectralResult:
     UsageError
         The rig file does not name the white reference's reflectance.
     """
-    run, protocol = part.run, part.protocol
-    require_intact(run, [DirectSpectra.DARK, DirectSpectra.LIT, DirectSpectra.OFF], part.overrides)
-    readings = _Readings(part)
+    run, protocol = context.run, context.protocol
+    require_intact(
+        run, [DirectSpectra.DARK, DirectSpectra.LIT, DirectSpectra.OFF], context.overrides
+    )
+    readings = _Readings(context)
     if not readings.lit:
         raise DataError(
             "expected readings of the white reference under some light, got none; go on with "
@@ -83,7 +159,7 @@ def analyse(part: Part) -> DirectBispectralResult:
         )
     whole = [reading for reading in readings.lit.values() if not reading.saturated.any()]
     noise = reading_noise([*whole, *readings.dark.values()])
-    card = card_reflectance(part.rig)
+    card = card_reflectance(context.rig)
     spectra, warnings = _spectra(readings, noise, card)
     whites = {light: spectra.pop((WHITE, light, False)) for light in protocol.lights
               if (WHITE, light, False) in spectra}  # fmt: skip
@@ -91,7 +167,7 @@ def analyse(part: Part) -> DirectBispectralResult:
         protocol.lights,
         whites,
         {light for stage, light, again in readings.lit if stage == WHITE and not again},
-        part.rig,
+        context.rig,
         are_filters=protocol.filters is not None,
     )
     warnings = [*ambient_light(list(readings.dark.values())), *warnings, *of_whites]
@@ -127,7 +203,7 @@ def analyse(part: Part) -> DirectBispectralResult:
             f"no sample was read under a light that can be used: {'; '.join(warnings)}; go on with "
             "labrig resume"
         )
-    lights = [_light_spectrum(name, white, part.rig) for name, white in whites.items()]
+    lights = [_light_spectrum(name, white, context.rig) for name, white in whites.items()]
     return DirectBispectralResult(
         lights=tuple(sorted(lights, key=lambda light: light.mean_nm)),
         samples=samples,
@@ -143,8 +219,8 @@ class _Readings:
     Lit ones, and those just after, by stage, light and whether again; dark ones by stage and time.
     """
 
-    def __init__(self, part: Part) -> None:
-        protocol, self.lit, self.off, self.dark = part.protocol, {}, {}, {}
+    def __init__(self, context: AnalysisContext) -> None:
+        protocol, self.lit, self.off, self.dark = context.protocol, {}, {}, {}
         lit_units = {
             protocol.unit_name(stage, light, again): (stage, light, again)
             for stage in protocol.stages
@@ -152,12 +228,12 @@ class _Readings:
             for again in (False, True)
         }
         for role, readings in ((DirectSpectra.LIT, self.lit), (DirectSpectra.OFF, self.off)):
-            for record in part.run.spectra(role):
-                if not part.overrides.excludes(record) and record.unit in lit_units:
+            for record in context.run.spectra(role):
+                if not context.overrides.excludes(record) and record.unit in lit_units:
                     readings[lit_units[record.unit]] = read_spectrometer_reading(record.path)
         stages = {f"{stage}: dark": stage for stage in protocol.stages}
-        for record in part.run.spectra(DirectSpectra.DARK):
-            if not part.overrides.excludes(record):
+        for record in context.run.spectra(DirectSpectra.DARK):
+            if not context.overrides.excludes(record):
                 key = stages[record.unit], round(record.integration_s, 9)
                 self.dark[key] = read_spectrometer_reading(record.path)
 
@@ -326,17 +402,10 @@ def _filter_window_nm(rig: RigFile, name: str) -> tuple[float, float]:
     return float(curve.wavelength_nm[low]), float(curve.wavelength_nm[high])
 
 
-def _declared_leds(rig: RigFile) -> dict[str, Any]:
-    """Return what the rig file says of each LED by its name, whatever the driver calls the list."""
-    entry = rig.devices.get(LEDS.key)
-    groups = [] if entry is None else entry.settings().values()
-    return {name: led for group in groups if isinstance(group, dict) for name, led in group.items()}
-
-
 def named_peak_nm(rig: RigFile, name: str) -> float:
     """Return the peak in nm that the rig file says of an LED; NaN where it says nothing."""
-    led = _declared_leds(rig).get(name)
-    return float(led.get("centre", np.nan)) if isinstance(led, dict) else float("nan")
+    led = bank_lights(rig, LEDS.key, rig.name).get(name)
+    return float("nan") if led is None or led.centre is None else float(led.centre)
 
 
 def _drift(first: _Lit | None, again: _Lit | None) -> Measured:

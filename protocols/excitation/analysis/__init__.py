@@ -1,4 +1,8 @@
-"""Analysis of an excitation run, from its frames to rates and a material of every patch."""
+"""Analysis of an excitation run, from its frames to rates and a material of every patch.
+
+A decay of a dozen photographs tells the flicker to a quarter of itself; the photographs after all
+charges are ten times as many.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -6,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.analyse.frames import require_intact
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectance
@@ -21,21 +25,21 @@ from labrig.calibration import (
     Warming,
 )
 from labrig.fit.excitation import RelativeSigmas
+from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.protocols.excitation.analysis.charge_intervals import GLOWING
-from labrig.protocols.excitation.analysis.charging_series import patch_chargings
+from labrig.protocols.excitation.analysis.charging_series import evened, patch_chargings
 from labrig.protocols.excitation.analysis.closure import predicted_charging
-from labrig.protocols.excitation.analysis.density import largest_density
-from labrig.protocols.excitation.analysis.evenness import evened
-from labrig.protocols.excitation.analysis.flicker import common_flicker
 from labrig.protocols.excitation.analysis.lamp_light import (
     LAMP_SIGMA,
     LARGEST_FACTOR,
     band_sigma,
     light_scatter,
+    remembered_warmth,
     scale_sigma,
+    scatter_by_warmth,
 )
-from labrig.protocols.excitation.analysis.material import excited_material
+from labrig.protocols.excitation.analysis.material import excited_material, largest_density
 from labrig.protocols.excitation.analysis.orders import ChosenOrders, OrderFits
 from labrig.protocols.excitation.analysis.radiometric_scale import (
     RadiometricScale,
@@ -46,11 +50,59 @@ from labrig.protocols.excitation.analysis.selected_light import (
     with_doubt,
     within_bands,
 )
-from labrig.protocols.excitation.analysis.warmth import remembered_warmth, scatter_by_warmth
 from labrig.protocols.excitation.options import ExcitationOptions
 from labrig.protocols.excitation.result import ExcitationResult, PatchCharging, PatchExcitation
 from labrig.record import FrameRole
 from labrig.results import ChargingSeries, Closure, EmissionSpectrum, FittedDecay, FittedExcitation
+
+
+def common_flicker(
+    fit: FittedExcitation, series: Sequence[ChargingSeries], dark_sigma: Sequence[float]
+) -> float:
+    """Return the relative flicker of all photographs by the method of moments.
+
+    A photograph is f times as bright as the fit says: f² has the mean of the squared flicker and of
+    the variance that noise and dark level give it. Every charge's lamp and the rates follow some of
+    the flicker, which so many photographs fewer tell.
+
+    Parameters
+    ----------
+    fit, series
+        A fit, and its series.
+    dark_sigma
+        Scatter of the dark level in the values' unit, shape (C,).
+    """
+    parts = [
+        _deviations(charging, residuals, np.array(dark_sigma))
+        for charging, residuals in zip(series, fit.residuals, strict=True)
+    ]
+    deviation, variance = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    weight = 1 / (TYPICAL_FLICKER**2 + variance) ** 2
+    lamp = sum(sum(len(charge.start_s) > 0 for charge in charging.charges) for charging in series)
+    # As many photographs as there are weights of the largest size.
+    effective = weight.sum() ** 2 / np.square(weight).sum()
+    free = effective - lamp - 3 * len(fit.states)
+    if free < 1:
+        return TYPICAL_FLICKER
+    mean_square = weight @ (deviation**2 * effective / free - variance) / weight.sum()
+    return float(np.sqrt(max(mean_square, 0.0)))
+
+
+def _deviations(
+    charging: ChargingSeries, residuals: FloatArray, dark_sigma: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the relative deviation of every measured photograph, and its variance by noise."""
+    signal = charging.values - residuals * charging.sigma
+    is_measured = np.isfinite(residuals)
+    scaled = np.where(is_measured, signal / charging.sigma, 0.0)
+    power = np.square(scaled).sum(axis=(1, 2))
+    along_dark = np.where(is_measured, scaled / charging.sigma, 0.0).sum(axis=1)
+    glows = power > 0
+    power, along_dark = power[glows], along_dark[glows]
+    deviation = (scaled * np.nan_to_num(residuals)).sum(axis=(1, 2))[glows] / power
+    variance = 1 / power + np.square(along_dark * dark_sigma).sum(axis=1) / power**2
+    return deviation, variance
+
 
 #: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
@@ -76,7 +128,7 @@ START_SIGMA = 0.1
 MIN_DARK = 1e-3
 
 
-def analyse(part: Part) -> ExcitationResult:
+def analyse(context: AnalysisContext) -> ExcitationResult:
     """Reduce all charges, and fit those of every patch together.
 
     Raises
@@ -87,21 +139,21 @@ def analyse(part: Part) -> ExcitationResult:
         Nothing glows, or the glow cannot be fitted.
     """
     irradiance, fade, blank = (
-        part.inputs[IRRADIANCE_KIND],
-        part.inputs[FADE_KIND],
-        part.inputs[BLANK_KIND],
+        context.inputs[IRRADIANCE_KIND],
+        context.inputs[FADE_KIND],
+        context.inputs[BLANK_KIND],
     )
     if irradiance is None:
         raise DataError(
             "expected the light on every place of the sample, got none; run irradiance and name "
             "its run in the rig file ('optics: {irradiance: …}') or to labrig process --optics"
         )
-    require_intact(part.run, (*GLOWING, FrameRole.DARK), part.overrides)
+    require_intact(context.run, (*GLOWING, FrameRole.DARK), context.overrides)
     warming = USUAL if fade is None or fade.warming is None else fade.warming
-    chargings, left_out = patch_chargings(part, irradiance, warming)
+    chargings, left_out = patch_chargings(context, irradiance, warming)
     patches, warnings = for_each_patch(
         list(chargings),
-        lambda patch: _patch_excitation(part, patch, chargings[patch], irradiance, warming),
+        lambda patch: _patch_excitation(context, patch, chargings[patch], irradiance, warming),
     )
     unmeasured = () if fade else ("the lamp's fade was not measured: a usual one was taken",)
     leaks = blank.leaks() if blank else ()
@@ -113,18 +165,18 @@ def analyse(part: Part) -> ExcitationResult:
 
 
 def _patch_excitation(
-    part: Part,
+    context: AnalysisContext,
     patch: StripPatch,
     charging: PatchCharging,
     irradiance: IrradianceFile,
     warming: Warming,
 ) -> tuple[PatchExcitation, Sequence[str]]:
     """Return the patch's excitation, and warnings."""
-    decay = fit_series(charging.whole, _states(part, patch))
+    decay = fit_series(charging.whole, _states(context, patch))
     charging = remembered_warmth(charging, decay, warming.deficit, warming.time_constant_s)
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), MIN_DARK).tolist())
     relative_sigmas = RelativeSigmas(
-        flicker=_flicker(part, decay),
+        flicker=_flicker(context, decay),
         lamp=LAMP_SIGMA,
         least_lamp=scatter_by_warmth(charging, warming.deficit_sigma),
         cold_deficit=warming.deficit_sigma,
@@ -139,29 +191,29 @@ def _patch_excitation(
         irradiance=band_sigma(irradiance),
         largest_factor=LARGEST_FACTOR,
     )
-    fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(part) is not None)
-    choice = fits.chosen(part.options(ExcitationOptions).order)
-    if part.inputs[CAMERA_KIND] is None:
+    fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(context) is not None)
+    choice = fits.chosen(context.options(ExcitationOptions).order)
+    if context.inputs[CAMERA_KIND] is None:
         flicker = common_flicker(choice.best, _series(charging), dark)
         relative_sigmas = replace(relative_sigmas, flicker=flicker)
         choice = replace(choice, relative_sigmas=relative_sigmas)
     charging = evened(charging, choice.best)
     even: FittedExcitation | None = None
     if irradiance.lights:
-        by_leds = bool(part.protocol.select.leds)
+        by_leds = bool(context.protocol.select.leds)
         charging, even = _within_bands(charging, irradiance, choice, by_leds=by_leds)
     fit = choice.fitted(
-        _series(charging), "all" if part.options(ExcitationOptions).intervals else "auto"
+        _series(charging), "all" if context.options(ExcitationOptions).intervals else "auto"
     )
     fit = fit if even is None else with_doubt(fit, even)
     density, basis = largest_density(
         irradiance.bands_nm,
-        part.protocol.sample.max_optical_density,
-        patch_reflectance(patch.folder, part.inputs[REFLECTANCE_KIND]),
+        context.protocol.sample.max_optical_density,
+        patch_reflectance(patch.folder, context.inputs[REFLECTANCE_KIND]),
     )
     fit = choice.in_a_layer(_series(charging), fit, density, basis)
     closure = predicted_charging(charging, relative_sigmas, _fitting_by_places(choice, even))
-    run, spectra = part.run, part.inputs.spectra
+    run, spectra = context.run, context.inputs.spectra
     spectrum = patch.own(spectra)
     frames = tuple(frame.path.name for role in GLOWING for frame in run.frames(role))
     material = excited_material(fit, irradiance, spectrum, patch.material, run.name, frames)
@@ -170,11 +222,11 @@ def _patch_excitation(
         if spectra and spectrum is None
         else ()
     )
-    if spectrum is not None and (scale := _scale(part, charging, fit, irradiance, spectrum)):
+    if spectrum is not None and (scale := _scale(context, charging, fit, irradiance, spectrum)):
         material = scale.of(material)
-    material = with_reflectance(material, patch.folder, part.inputs[REFLECTANCE_KIND])
-    material = with_layer(material, part.protocol.sample)
-    material = at_temperature(material, run, part.protocol.rate_frames)
+    material = with_reflectance(material, patch.folder, context.inputs[REFLECTANCE_KIND])
+    material = with_layer(material, context.protocol.sample)
+    material = at_temperature(material, run, context.protocol.rate_frames)
     return (
         PatchExcitation(charging, decay, fit, light_scatter(fit), material, closure),
         (
@@ -221,7 +273,7 @@ def _fitting_by_places(
 
 
 def _scale(
-    part: Part,
+    context: AnalysisContext,
     charging: PatchCharging,
     fit: FittedExcitation,
     irradiance: IrradianceFile,
@@ -232,7 +284,7 @@ def _scale(
     channel = whole.channels[int(np.argmax(fit.channel_weights))]
     iso, f_number = float(whole.iso[0]), float(whole.f_number[0])
     aperture = None if np.isnan(f_number) else f_number
-    return radiometric_scale(part, irradiance, spectrum, channel, iso, aperture)
+    return radiometric_scale(context, irradiance, spectrum, channel, iso, aperture)
 
 
 def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
@@ -266,18 +318,18 @@ def _closure_warnings(closure: Closure | None) -> Iterator[str]:
         )
 
 
-def _asked_states(part: Part) -> int | None:
+def _asked_states(context: AnalysisContext) -> int | None:
     """Return the number of states that is asked for; None if the data choose it."""
-    protocol_states = part.protocol.states
-    return part.options(ExcitationOptions).states or (
+    protocol_states = context.protocol.states
+    return context.options(ExcitationOptions).states or (
         None if protocol_states == "auto" else protocol_states
     )
 
 
-def _states(part: Part, patch: StripPatch) -> int | None:
+def _states(context: AnalysisContext, patch: StripPatch) -> int | None:
     """Return the number of states of an earlier decay of this patch, if none is asked for."""
-    states = _asked_states(part)
-    if states is None and (decay := patch.own(part.inputs.decays)) is not None:
+    states = _asked_states(context)
+    if states is None and (decay := patch.own(context.inputs.decays)) is not None:
         return decay.n_states
     return states
 
@@ -286,7 +338,7 @@ def _series(charging: PatchCharging) -> list[ChargingSeries]:
     return [charging.through, charging.direct]
 
 
-def _flicker(part: Part, decay: FittedDecay) -> float:
-    if (camera := part.inputs[CAMERA_KIND]) is not None:
+def _flicker(context: AnalysisContext, decay: FittedDecay) -> float:
+    if (camera := context.inputs[CAMERA_KIND]) is not None:
         return camera.flicker
     return decay.flicker if decay.flicker > 0 else TYPICAL_FLICKER

@@ -82,7 +82,7 @@ def charge_frames(
     overrides: Overrides,
     time_constant_s: float,
     blank: BlankFile | None = None,
-    beside: RunRecord | None = None,
+    other_parts: RunRecord | None = None,
 ) -> ChargeFrames:
     """Return a run's charges and photographs, without those before its blank is clean.
 
@@ -96,7 +96,7 @@ def charge_frames(
         Time constant in seconds with which the lamp's housing warms and cools.
     blank
         Stray light of the bench; None if it was not measured.
-    beside
+    other_parts
         Record of other units, for which the lamp burned meanwhile; None if there are none.
 
     Raises
@@ -107,7 +107,7 @@ def charge_frames(
     """
     charges = _intervals(run)
     own_units = {interval.unit for interval in charges}
-    burned = [] if beside is None else _intervals(beside)
+    burned = [] if other_parts is None else _intervals(other_parts)
     by_lamp = sorted(
         (interval for interval in (*charges, *burned) if not interval.is_led), key=_begin
     )

@@ -1,14 +1,23 @@
-"""From a run's frames to charging series: every charge with the photographs after it."""
+"""From a run's frames to charging series of even sites: every charge and the photographs after it.
+
+A slice of the strip consists of whole pixels, and some of a colour filter array's colours lie in
+every other column only: a channel's mean belongs to a place up to a pixel beside the site's middle,
+and to another width. Along the filter the glow may change by a factor of two from site to site, so
+that this matters wherever sites are a few pixels wide. The glow of a channel is taken for a cubic
+spline whose means over the channel's pixels are those measured; its means over the sites are linear
+in them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
+from scipy.interpolate import CubicSpline
 
 from labrig.analyse.frames import require_calibrated_camera, timed, untimed
-from labrig.analyse.inputs import Part
-from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions
+from labrig.analyse.inputs import AnalysisContext
+from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.calibration import BLANK_KIND, CAMERA_KIND, FADE_KIND, IrradianceFile, Warming
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError
@@ -18,7 +27,6 @@ from labrig.protocols.excitation.analysis.charge_intervals import (
     ChargeInterval,
     charge_frames,
 )
-from labrig.protocols.excitation.analysis.evenness import evenness
 from labrig.protocols.excitation.analysis.lamp_light import (
     KNOWN,
     across_sites,
@@ -27,12 +35,132 @@ from labrig.protocols.excitation.analysis.lamp_light import (
     site_modes,
 )
 from labrig.protocols.excitation.analysis.selected_light import selected_light
-from labrig.protocols.excitation.analysis.site_means import site_means, site_weights
 from labrig.protocols.excitation.result import PatchCharging
 from labrig.protocols.steps.exciting_lights import ExcitingLights
 from labrig.record import FrameRole
-from labrig.reduce import reduce_patches, sensor_layout
-from labrig.results import Charge, ChargingSeries, EarlierCharges, Series, Transient
+from labrig.reduce import SensorLayout, reduce_patches, sensor_layout
+from labrig.results import (
+    Charge,
+    ChargingSeries,
+    EarlierCharges,
+    FittedExcitation,
+    Series,
+    Transient,
+)
+
+
+def evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
+    """Return about how bright every place is after the same light, 1 on average, shape (P,).
+
+    What earlier charges have left at the places counts as their brightness here; a fit tells the
+    two apart.
+
+    Parameters
+    ----------
+    values, sigma
+        Photographs after charges by the lamp itself, shape (n, P, C).
+
+    Raises
+    ------
+    DataError
+        Some place does not glow, or is clipped.
+    """
+    weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
+    is_known = weight.min(axis=1, keepdims=True) > 0
+    expected = np.where(
+        is_known, np.nanmean(np.where(is_known, values, 0.0), axis=1, keepdims=True), 0.0
+    )
+    weight = np.where(is_known, weight, 0.0)
+    total = (weight * expected**2).sum(axis=(0, 2))
+    if not (total > 0).all():
+        raise DataError(
+            "expected a glow all along the filter's place after charges by the lamp itself, got "
+            "none somewhere, or it is clipped; check where the sample and the filter lie"
+        )
+    signal = (weight * expected * np.nan_to_num(values)).sum(axis=(0, 2)) / total
+    return np.asarray(signal / signal.mean())
+
+
+def evened(charging: PatchCharging, fit: FittedExcitation) -> PatchCharging:
+    """Divide by the evenness that a fit has found beside what earlier charges have left.
+
+    After the first charges by the lamp itself places still glow by what charged them through the
+    filter, which slow states and a kinetic order above 1 keep for long.
+
+    Parameters
+    ----------
+    charging
+        Charging of a patch.
+    fit
+        Fit of it.
+    """
+    factor = 1 / fit.evenness[:, None]
+
+    def divided(series: ChargingSeries) -> ChargingSeries:
+        return replace(series, values=series.values * factor, sigma=series.sigma * factor)
+
+    through, veils = divided(charging.through), charging.through.frame_light
+    return replace(
+        charging,
+        through=through if veils is None else replace(through, frame_light=veils * factor),
+        direct=divided(charging.direct),
+        evenness=charging.evenness * fit.evenness,
+    )
+
+
+#: Weight from which a site is not known where another one is not.
+DEPENDS = 0.01
+
+
+def site_weights(slices: Slices, irradiance: IrradianceFile, layout: SensorLayout) -> FloatArray:
+    """Return the weights (C, P, P) of the slices' means in those of the sites.
+
+    Parameters
+    ----------
+    slices
+        Regions in which the means were measured.
+    irradiance
+        Positions of the sites' middles along the filter.
+    layout
+        Size and colours of the sensor.
+    """
+    strip, position = irradiance.lvf_strip(), np.array(irradiance.position)
+    rising = np.argsort(position)
+    integral = CubicSpline(position[rising], np.eye(len(position))[rising]).antiderivative()
+    half = 0.5 / len(position)
+    of_sites = (integral(position + half) - integral(position - half)) / (2 * half)
+    left, right = strip.left[0] * layout.width, strip.right[0] * layout.width
+    of_slices = np.empty((len(layout.channels), *of_sites.shape))
+    offsets = tilt_offset(strip, slices, layout)
+    for number, (region, offset) in enumerate(zip(slices.values(), offsets, strict=True)):
+        first, weights = layout.column_weights(region)
+        edges = (np.arange(first, first + weights.shape[1] + 1) - left) / (right - left) + offset
+        along = edges if strip.rising else 1 - edges
+        of_columns = np.diff(integral(along), axis=0) / np.diff(along)[:, None]
+        of_slices[:, number] = weights @ of_columns
+    return np.asarray(of_sites @ np.linalg.inv(of_slices))
+
+
+def site_means(
+    values: FloatArray, sigma: FloatArray, usable: BoolArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return means over sites and their σ, shape (n, P, C) each; NaN where they are not known.
+
+    Parameters
+    ----------
+    values, sigma
+        Means over slices and their σ, shape (n, P, C).
+    usable
+        Whether a slice must be used, shape (n, P).
+    weights
+        Weights of the slices by `site_weights`.
+    """
+    means = np.einsum("cpq,fqc->fpc", weights, values)
+    mean_sigma = np.sqrt(np.einsum("cpq,fqc->fpc", weights**2, sigma**2))
+    depends = (np.abs(weights) > DEPENDS).any(axis=0)
+    is_known = (usable[:, None, :] | ~depends).all(axis=2, keepdims=True)
+    return np.where(is_known, means, np.nan), np.where(is_known, mean_sigma, np.nan)
+
 
 #: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"
@@ -48,7 +176,7 @@ NOTHING: FloatArray = np.empty((0, 0, 0))
 
 
 def patch_chargings(
-    part: Part, irradiance: IrradianceFile, warming: Warming
+    context: AnalysisContext, irradiance: IrradianceFile, warming: Warming
 ) -> tuple[dict[StripPatch, PatchCharging], tuple[str, ...]]:
     """Read and reduce all frames of the run to the charging of each patch, and warnings.
 
@@ -69,18 +197,22 @@ def patch_chargings(
     UsageError
         The irradiance is that of selected lights and the run's charges went through the filter.
     """
-    inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
+    inputs, overrides, protocol = context.inputs, context.overrides, context.protocol
     frames = charge_frames(
-        part.run, overrides, warming.time_constant_s, inputs[BLANK_KIND], part.beside
+        context.run, overrides, warming.time_constant_s, inputs[BLANK_KIND], context.other_parts
     )
-    require_calibrated_camera(inputs[CAMERA_KIND], part.run, list(frames.charge_of))
+    require_calibrated_camera(inputs[CAMERA_KIND], context.run, list(frames.charge_of))
     layout = sensor_layout(next(iter(frames.charge_of)))
     if protocol.select is None:
         strip = irradiance.lvf_strip()
-        sites, reasons = slice_strip(strip_regions(part), strip, layout, len(irradiance.position))
+        sites, reasons = slice_strip(
+            strip_regions(context), strip, layout, len(irradiance.position)
+        )
     else:
         _require_lights(protocol.select, irradiance)
-        sites = {patch: {SAMPLE: patch.region or protocol.sites} for patch in strip_regions(part)}
+        sites = {
+            patch: {SAMPLE: patch.region or protocol.sites} for patch in strip_regions(context)
+        }
         reasons = ()
     series = reduce_patches(
         [
@@ -95,7 +227,7 @@ def patch_chargings(
         | {FRAME: WHOLE_FRAME},
         [
             untimed(frame)
-            for frame in part.run.frames(FrameRole.DARK)
+            for frame in context.run.frames(FrameRole.DARK)
             if not overrides.excludes(frame)
         ],
         camera=inputs[CAMERA_KIND],

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import (
     CAMERA_KIND,
@@ -91,7 +91,7 @@ class RadiometricScale:
 
 
 def radiometric_scale(
-    part: Part,
+    context: AnalysisContext,
     irradiance: IrradianceFile,
     spectrum: EmissionSpectrum,
     channel: str,
@@ -114,18 +114,18 @@ def radiometric_scale(
         Settings to which the counts belong.
     """
     card = irradiance.card
-    optics = part.rig.optics
+    optics = context.rig.optics
     if card is None or channel not in card.channels or optics.lamp is None:
         return None
     if optics.grey_card is None:
         return None
     try:
-        camera = camera_curves(part.rig, part.overrides.camera, part.inputs[LVF_KIND])
+        camera = camera_curves(context.rig, context.overrides.camera, context.inputs[LVF_KIND])
     except UsageError:
         return None
     if channel not in camera.channels:
         return None
-    lamp, grey = lamp_spectrum(part.rig), card_reflectance(part.rig)
+    lamp, grey = lamp_spectrum(context.rig), card_reflectance(context.rig)
     relative = scale_of(
         card,
         camera,
@@ -135,7 +135,7 @@ def radiometric_scale(
         Spectrum("glow", np.array(spectrum.wavelength_nm), np.array(spectrum.value)),
         irradiance.bands_nm,
     )
-    factors = (_settings(part, card, iso, f_number), *relative)
+    factors = (_settings(context, card, iso, f_number), *relative)
     lux, lux_sigma = irradiance.illuminance_lux, irradiance.illuminance_sigma_lux
     if lux is None:
         return RadiometricScale("relative", factors)
@@ -234,10 +234,12 @@ def mean_irradiance(
     )
 
 
-def _settings(part: Part, card: CardLight, iso: float, f_number: float | None) -> ScaleFactor:
+def _settings(
+    context: AnalysisContext, card: CardLight, iso: float, f_number: float | None
+) -> ScaleFactor:
     """Return the card's signal per that at the settings of the glow."""
     value, sigma = relative_sensitivity(
-        part.inputs[CAMERA_KIND], (card.iso, card.f_number), (iso, f_number)
+        context.inputs[CAMERA_KIND], (card.iso, card.f_number), (iso, f_number)
     )
     return ScaleFactor(
         name="card's sensitivity and aperture over those of the glow",

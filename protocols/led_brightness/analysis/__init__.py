@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from labrig.acquire import led_lights
-from labrig.analyse.inputs import Part
+from labrig.acquire import LEDS, bank_lights
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import DATA_SHEET_NM, camera_curves, card_reflectance, led_exposures
 from labrig.calibration import UV_NM, CalibratedLed, LedsFile, LedSource, UvScale
 from labrig.fit.leds import (
@@ -58,7 +58,7 @@ DRIFT = 0.02
 BAND_SIGMA = 0.003
 
 
-def analyse(part: Part) -> LedBrightnessResult:
+def analyse(context: AnalysisContext) -> LedBrightnessResult:
     """Measure spectrum and brightness of every LED.
 
     Raises
@@ -68,12 +68,12 @@ def analyse(part: Part) -> LedBrightnessResult:
     DataError
         Frames are missing or damaged, or no LED lit.
     """
-    bank = _bank(part)
-    values = camera_values(part, bank.camera)
+    bank = _bank(context)
+    values = camera_values(context, bank.camera)
     spectra = {
         unit: seen
         for unit in values
-        if (seen := spectrometry(part, unit, unit.removeprefix(CARD))) is not None
+        if (seen := spectrometry(context, unit, unit.removeprefix(CARD))) is not None
     }
     of_cards = {
         unit.removeprefix(CARD): reading for unit, reading in values.items() if _is_card(unit)
@@ -81,29 +81,29 @@ def analyse(part: Part) -> LedBrightnessResult:
     by_led = {
         unit.removeprefix(CARD): reading for unit, reading in spectra.items() if _is_card(unit)
     }
-    checked = check_leds(bank, of_cards, by_led, part.protocol.leds)
+    checked = check_leds(bank, of_cards, by_led, context.protocol.leds)
     bank, of_cards = _without_unseen(checked, bank, of_cards)
     measured = _measured(bank, of_cards, by_led, checked)
     if all(led.value is None and led.light is None for led in measured):
         reasons = "; ".join(finding.text for finding in checked.findings)
-        raise DataError(f"{part.run.folder}: no LED can be used: {reasons}")
-    drift = _drift(part.protocol.shuffled()[0], values, spectra)
-    return _Calibration(part, bank, of_cards, by_led, checked, measured, drift).result()
+        raise DataError(f"{context.run.folder}: no LED can be used: {reasons}")
+    drift = _drift(context.protocol.shuffled()[0], values, spectra)
+    return _Calibration(context, bank, of_cards, by_led, checked, measured, drift).result()
 
 
 def _is_card(unit: str) -> bool:
     return unit.startswith(CARD)
 
 
-def _bank(part: Part) -> Bank:
-    source = str(part.run.folder)
-    exposures = led_exposures(part.rig, source)
-    camera = camera_curves(part.rig, part.overrides.camera)
+def _bank(context: AnalysisContext) -> Bank:
+    source = str(context.run.folder)
+    exposures = led_exposures(context.rig, source)
+    camera = camera_curves(context.rig, context.overrides.camera)
     nominal = {name: exposure.light for name, exposure in exposures.items()}
-    lights = led_lights(part.rig, source)
+    lights = bank_lights(context.rig, LEDS.key, source)
     sketched = frozenset(name for name, light in lights.items() if light.spectrum is None)
     sigma_nm = {name: exposure.wavelength_sigma_nm for name, exposure in exposures.items()}
-    return Bank(nominal, sketched, sigma_nm, camera, card_reflectance(part.rig))
+    return Bank(nominal, sketched, sigma_nm, camera, card_reflectance(context.rig))
 
 
 def _without_unseen(
@@ -206,7 +206,7 @@ class _Comparison:
 class _Calibration:
     """Result from the readings of every LED that count."""
 
-    part: Part
+    part: AnalysisContext
     bank: Bank
     values: Mapping[str, CameraValues]
     spectra: Mapping[str, Spectrometry]

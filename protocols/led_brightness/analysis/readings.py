@@ -13,7 +13,7 @@ from labrig.analyse.frames import (
     require_intact,
     untimed,
 )
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import card_reflectance
 from labrig.calibration import CAMERA_KIND
 from labrig.fit.leds import LedBand, led_band
@@ -99,7 +99,7 @@ class Spectrometry:
     response_sigma: float
 
 
-def camera_values(part: Part, camera: CameraResponse) -> dict[str, CameraValues]:
+def camera_values(context: AnalysisContext, camera: CameraResponse) -> dict[str, CameraValues]:
     """Measure the white reference in the frames of every completed unit.
 
     Raises
@@ -107,19 +107,19 @@ def camera_values(part: Part, camera: CameraResponse) -> dict[str, CameraValues]
     DataError
         Frames are missing or damaged, or they have other channels than the camera's curves.
     """
-    lit = part_frames(part, BrightnessFrames.CARD)
+    lit = part_frames(context, BrightnessFrames.CARD)
     if not lit:
         raise DataError(
-            f"{part.run.folder}: no LED's unit is complete; go on with: labrig resume "
-            f"{part.run.folder}"
+            f"{context.run.folder}: no LED's unit is complete; go on with: labrig resume "
+            f"{context.run.folder}"
         )
-    require_calibrated_camera(part.inputs[CAMERA_KIND], part.run, lit)
-    off = part_frames(part, BrightnessFrames.CARD_OFF)
-    darks = part_frames(part, FrameRole.DARK)
-    series, off_series = (_series(part, frames, darks) for frames in (lit, off))
+    require_calibrated_camera(context.inputs[CAMERA_KIND], context.run, lit)
+    off = part_frames(context, BrightnessFrames.CARD_OFF)
+    darks = part_frames(context, FrameRole.DARK)
+    series, off_series = (_series(context, frames, darks) for frames in (lit, off))
     if set(series.channels) != set(camera.channels):
         raise UsageError(
-            f"{part.run.folder}: expected frames with the channels of the camera's curves, "
+            f"{context.run.folder}: expected frames with the channels of the camera's curves, "
             f"{', '.join(camera.channels)}, got {', '.join(series.channels)}; name this camera's "
             "curves in the rig file (optics: camera)"
         )
@@ -130,13 +130,15 @@ def camera_values(part: Part, camera: CameraResponse) -> dict[str, CameraValues]
     }
 
 
-def _series(part: Part, frames: Sequence[FrameRecord], darks: Sequence[FrameRecord]) -> Series:
-    region = part_region(part, part.protocol.card)
+def _series(
+    context: AnalysisContext, frames: Sequence[FrameRecord], darks: Sequence[FrameRecord]
+) -> Series:
+    region = part_region(context, context.protocol.card)
     measured = reduce_patches(
         [untimed(frame) for frame in frames],
         {"card": region},
         [untimed(frame) for frame in darks],
-        camera=part.inputs[CAMERA_KIND],
+        camera=context.inputs[CAMERA_KIND],
     )
     return measured["card"]
 
@@ -170,7 +172,7 @@ def _less(
     return replace(measured, value=value - off_value, sigma=np.hypot(sigma, off_sigma))
 
 
-def spectrometry(part: Part, unit: str, name: str) -> Spectrometry | None:
+def spectrometry(context: AnalysisContext, unit: str, name: str) -> Spectrometry | None:
     """Return what the spectrometer saw in a unit; None if it was not read.
 
     Raises
@@ -179,8 +181,8 @@ def spectrometry(part: Part, unit: str, name: str) -> Spectrometry | None:
         A reading is damaged.
     """
     roles = (BrightnessFrames.SPECTRUM, BrightnessFrames.SPECTRUM_OFF)
-    require_intact(part.run, roles, part.overrides)
-    lit, off = (_records(part, role, unit) for role in roles)
+    require_intact(context.run, roles, context.overrides)
+    lit, off = (_records(context, role, unit) for role in roles)
     if not lit or not off:
         return None
     readings = [read_spectrometer_reading(record.path) for record in lit]
@@ -199,7 +201,7 @@ def spectrometry(part: Part, unit: str, name: str) -> Spectrometry | None:
         if calibration.sigma is not None:
             response_sigma = float(np.median(calibration.sigma / calibration.value))
     # It reads the reference, whose reflectance is not that of a white.
-    reflected = card_reflectance(part.rig).at(measured.wavelength_nm)
+    reflected = card_reflectance(context.rig).at(measured.wavelength_nm)
     factor = factor / (measured.integration_s * reflected)
     inside = np.ones(len(factor), dtype=np.bool_)
     inside[list(stacked.dark_pixels)] = False
@@ -223,11 +225,11 @@ def spectrometry(part: Part, unit: str, name: str) -> Spectrometry | None:
     )  # fmt: skip
 
 
-def _records(part: Part, role: str, unit: str) -> list[SpectrumRecord]:
+def _records(context: AnalysisContext, role: str, unit: str) -> list[SpectrumRecord]:
     return [
         record
-        for record in part.run.spectra(role)
-        if record.unit == unit and not part.overrides.excludes(record)
+        for record in context.run.spectra(role)
+        if record.unit == unit and not context.overrides.excludes(record)
     ]
 
 

@@ -7,16 +7,16 @@ from typing import Literal
 
 import numpy as np
 
-from labrig.analyse.card_checks import UsableLights, usable_lights
-from labrig.analyse.inputs import Part
-from labrig.analyse.lit_patches import LightKind, LitPatch, lit_patches, mean_of
-from labrig.analyse.lit_system import lit_system
-from labrig.analyse.lit_warnings import (
+from labrig.analyse.card_checks import (
+    UsableLights,
     bleaching_warnings,
     fact_warnings,
     left_warnings,
     per_led_warnings,
+    usable_lights,
 )
+from labrig.analyse.inputs import AnalysisContext
+from labrig.analyse.lit_patches import LightKind, LitPatch, lit_patches, lit_system, mean_of
 from labrig.bench_optics import (
     LedExposure,
     camera_curves,
@@ -38,12 +38,13 @@ from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import appearance, read_emissions
 from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
-from labrig.protocols.led_fluorescence.analysis.direct import direct_measurement, missing_samples
 from labrig.protocols.led_fluorescence.analysis.methods import (
+    direct_measurement,
     method_differences,
+    missing_samples,
+    mixture_of,
     reradiation_under_lights,
 )
-from labrig.protocols.led_fluorescence.analysis.mixture import mixture_of
 from labrig.protocols.led_fluorescence.options import LedFluorescenceOptions
 from labrig.protocols.led_fluorescence.protocol import SAMPLE, LedFrames
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
@@ -69,7 +70,7 @@ LIT = 0.1
 DEPENDS, EXCITED = 0.5, 0.5
 
 
-def analyse(part: Part) -> LedFluorescenceResult:
+def analyse(context: AnalysisContext) -> LedFluorescenceResult:
     """Estimate the re-radiation matrix of each patch.
 
     Raises
@@ -80,9 +81,12 @@ def analyse(part: Part) -> LedFluorescenceResult:
     DataError
         Frames are missing or damaged, or fewer than two LEDs can be used.
     """
-    lights = _lights(part)
-    camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
-    lit = _lit(part, lights, camera, white)
+    lights = _lights(context)
+    camera, white = (
+        camera_curves(context.rig, context.overrides.camera),
+        card_reflectance(context.rig),
+    )
+    lit = _lit(context, lights, camera, white)
     warnings = list(lit.warnings)
     card = mean_of(lit.cards)
     system = lit_system([lights[led] for led in lit.used], camera, white, card)
@@ -93,11 +97,13 @@ def analyse(part: Part) -> LedFluorescenceResult:
         only_leds = lit_system(of_leds, camera, white, card.under(by_led))
     # Frames show all samples at once, but not the card.
     flicker = np.hypot(card.flicker, mean_of(lit.samples).flicker)
-    named = part.rig.optics.emission_library
+    named = context.rig.optics.emission_library
     library = () if named is None else read_emissions(named)
     estimator = JointEstimator(system.with_drift(flicker), library)
-    method: EstimateMethod = part.options(LedFluorescenceOptions).method or part.protocol.method
-    direct = direct_measurement(part.rig)
+    method: EstimateMethod = (
+        context.options(LedFluorescenceOptions).method or context.protocol.method
+    )
+    direct = direct_measurement(context.rig)
     if direct is not None:
         warnings += missing_samples(direct, lit.samples)
     patches = {}
@@ -122,8 +128,8 @@ def analyse(part: Part) -> LedFluorescenceResult:
         is_brightness_known=~system.is_loose,
         uv_scale=_uv_scale(lit.peak_nm, system),
         patches=patches,
-        run=part.run.name,
-        geometry=part.rig.optics.geometry_text,
+        run=context.run.name,
+        geometry=context.rig.optics.geometry_text,
         lamps=lit.lamps,
         warnings=tuple(warnings),
     )
@@ -158,7 +164,7 @@ class _Lit:
 
 
 def _lit(
-    part: Part,
+    context: AnalysisContext,
     lights: Mapping[str, LedExposure],
     camera: CameraResponse,
     white: Transmittance,
@@ -170,24 +176,25 @@ def _lit(
     DataError
         Fewer than two LEDs can be used.
     """
-    names = [*part.protocol.leds, *part.protocol.lamps]
+    names = [*context.protocol.leds, *context.protocol.lamps]
     spectra = {led: replace(lights[led].light, name=led) for led in names}
-    first = part.protocol.shuffled()[0]
-    cards = lit_patches(part, LedFrames.CARD, CARD, names)
-    samples = lit_patches(part, LedFrames.SAMPLE, SAMPLE, names, first)
-    leds, lamps = _usable(part, spectra, camera, white, cards, samples)
+    first = context.protocol.shuffled()[0]
+    cards = lit_patches(context, LedFrames.CARD, CARD, names)
+    samples = lit_patches(context, LedFrames.SAMPLE, SAMPLE, names, first)
+    leds, lamps = _usable(context, spectra, camera, white, cards, samples)
     if len(leds.by_row) < 2:
         raise DataError(
             f"expected two LEDs or more that can be used, got {len(leds.by_row)}: "
             f"{'; '.join(leds.left_out)}"
         )
     warnings = [*leds.warnings, *lamps.warnings]
-    if part.rig.optics.may_see_gloss:
+    if context.rig.optics.may_see_gloss:
         warnings.append(
-            f"at {part.rig.optics.geometry_text} a surface's gloss reaches the camera, and is in "
+            f"at {context.rig.optics.geometry_text} a surface's gloss reaches the "
+            "camera, and is in "
             "the reflectance: light from 45°, or cross polarisers"
         )
-    kind: LightKind = "light" if part.protocol.lamps else "LED"
+    kind: LightKind = "light" if context.protocol.lamps else "LED"
     for what, patches in (("card", cards), ("samples", samples)):
         warnings += left_warnings(what, patches, names, kind)
     peak_nm = {
@@ -212,7 +219,7 @@ def _lit(
 
 
 def _usable(
-    part: Part,
+    context: AnalysisContext,
     spectra: Mapping[str, Spectrum],
     camera: CameraResponse,
     white: Transmittance,
@@ -220,7 +227,7 @@ def _usable(
     samples: Mapping[str, LitPatch],
 ) -> tuple[UsableLights, UsableLights]:
     """Return the LEDs and the lamps that can be used, by the rows of all lights."""
-    leds, lamps = part.protocol.leds, part.protocol.lamps
+    leds, lamps = context.protocol.leds, context.protocol.lamps
 
     def of(names: Sequence[str], begin: int, kind: LightKind) -> UsableLights:
         rows = range(begin, begin + len(names))
@@ -235,7 +242,7 @@ def _usable(
     return usable, of(lamps, len(leds), "lamp") if lamps else UsableLights({}, (), (), {})
 
 
-def _lights(part: Part) -> dict[str, LedExposure]:
+def _lights(context: AnalysisContext) -> dict[str, LedExposure]:
     """Return the lights of the protocol by name, LEDs and lamps.
 
     Raises
@@ -243,13 +250,13 @@ def _lights(part: Part) -> dict[str, LedExposure]:
     UsageError
         The rig file lacks one of them.
     """
-    protocol = part.protocol
-    lights = led_exposures(part.rig, "rig.yaml", part.inputs[LEDS_KIND])
+    protocol = context.protocol
+    lights = led_exposures(context.rig, "rig.yaml", context.inputs[LEDS_KIND])
     if unknown := [led for led in protocol.leds if led not in lights]:
         raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
     if not protocol.lamps:
         return lights
-    lamps = illuminant_exposures(part.rig, "rig.yaml")
+    lamps = illuminant_exposures(context.rig, "rig.yaml")
     if unknown := [lamp for lamp in protocol.lamps if lamp not in lamps]:
         raise UsageError(f"rig.yaml: expected lamps called {', '.join(unknown)}, got none")
     return lights | {lamp: lamps[lamp] for lamp in protocol.lamps}

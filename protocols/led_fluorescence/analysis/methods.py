@@ -1,13 +1,17 @@
-"""What the methods say of the same sample: re-radiation under each light, and colours."""
+"""Estimates of the same sample by several methods: directly, as a mixture, as seen in colours."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 
+from labrig.acquire import RigFile
+from labrig.fit import fit_mixture
 from labrig.fit.fluorescence import FluorescenceFit
-from labrig.foundation.arrays import FloatArray
+from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix, compare_colours
 from labrig.optics import Spectrum, edges_from_centres, read_light
 from labrig.results import (
@@ -15,8 +19,10 @@ from labrig.results import (
     DirectMeasurement,
     MeasuringMethod,
     MethodDifference,
+    MixtureOfMatrix,
     ReradiatedSpectrum,
     ReradiationUnderLight,
+    read_result,
 )
 
 #: Lights under which the methods' colours are compared.
@@ -117,3 +123,82 @@ def _completed(measured: ReradiationMatrix, by: ReradiationMatrix) -> Reradiatio
 
 def _filled(measured: FloatArray, other: FloatArray) -> FloatArray:
     return np.where(np.isnan(measured), other, measured)
+
+
+def direct_measurement(rig: RigFile) -> DirectMeasurement | None:
+    """Read the direct measurement that a rig file names; None if it names none.
+
+    Raises
+    ------
+    UsageError, DataError
+        There is no such run, it has no result, or it is another protocol's.
+    """
+    named = rig.optics.direct
+    if named is None:
+        return None
+    result = read_result(Path(named))
+    direct: DirectMeasurement | None = result.provides().get("direct")
+    if direct is None:
+        raise UsageError(
+            f"{named}: expected a run of direct_bispectral (optics: direct), got one of "
+            f"{result.kind}; name another run, or leave the key out"
+        )
+    if len(direct.lights) < 2:
+        raise UsageError(
+            f"{named}: expected a direct measurement under two lights or more, got one"
+        )
+    return direct
+
+
+def missing_samples(direct: DirectMeasurement, names: Iterable[str]) -> list[str]:
+    """Return a warning if no sample was measured directly under the name of a patch."""
+    if any(name in direct.samples for name in names):
+        return []
+    return [
+        f"optics: direct: no sample is called {' or '.join(names)}; it has "
+        f"{', '.join(direct.samples)}, and nothing is compared"
+    ]
+
+
+#: Components of a mixture: with more it follows little but noise (Hua et al. 2021).
+COMPONENTS = 3
+#: Least part of the strongest entry that counts as re-radiation. An estimate is smooth, and errors
+#: of its entries have the same sign: σ of each would leave out what belongs to the dye.
+LEAST_PART = 0.01
+
+
+def mixture_of(matrix: ReradiationMatrix, is_extrapolated: BoolArray) -> MixtureOfMatrix | None:
+    """Fit a mixture to the input bands that LEDs lit; None where they re-radiate nothing.
+
+    Parameters
+    ----------
+    matrix
+        The estimated matrix.
+    is_extrapolated
+        Input bands whose numbers are extrapolated and are left out, shape (i,).
+    """
+    unknown = np.broadcast_to(is_extrapolated, matrix.reradiation.shape)
+    lit = replace(matrix, reradiation=np.where(unknown, np.nan, matrix.reradiation))
+    per_band = lit.reradiation * lit.output_width_nm[:, np.newaxis]
+    threshold = LEAST_PART * float(np.nanmax(np.where(lit.is_stokes, per_band, 0.0)))
+    if not threshold > 0:
+        return None
+    try:
+        fit = fit_mixture(lit, COMPONENTS, threshold=threshold)
+    except (DataError, UsageError):
+        # Too few entries for as many numbers.
+        return None
+    edges = matrix.input_edges_nm
+    bands = np.flatnonzero(~is_extrapolated)
+    return MixtureOfMatrix(
+        scale=fit.mixture.scale,
+        weights=fit.mixture.weights,
+        mean_nm=fit.mixture.mean_nm,
+        covariance_nm2=fit.mixture.covariance_nm2,
+        measured_nm=(float(edges[bands[0]]), float(edges[bands[-1] + 1])),
+        threshold=fit.threshold,
+        kept_entries=fit.kept_entries,
+        entries=fit.entries,
+        masked_mse=fit.masked_mse,
+        band_nm=fit.band_nm,
+    )

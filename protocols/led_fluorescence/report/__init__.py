@@ -21,9 +21,8 @@ from labrig.protocols.led_fluorescence.report.led_figures import (
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from labrig.report.colours import Screen, css_colour, into_gamut, screen_for
 from labrig.report.figure_style import VARIABLES
-from labrig.report.heat_map import RETURNING
 from labrig.report.reradiation import screen_linear
-from labrig.report.reradiation_spectra import emission_spectra, spectra_chart
+from labrig.report.reradiation_figures import RETURNING, emission_spectra, spectra_chart
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import ColourUnderLight, FluorescentPatch
 

@@ -20,15 +20,15 @@ from labrig.report.chart import (
     linear_axis,
 )
 from labrig.report.figure_style import DASHED, INK, MUTED, OTHER_CHANNELS, RULE, channel_colour
-from labrig.report.heat_map import (
+from labrig.report.reradiation_figures import (
     BAND_NM,
     INCIDENT,
     RETURNING,
     heat_figure,
     largest,
+    limits,
     shown_values,
 )
-from labrig.report.reradiation_spectra import limits
 from labrig.results import FluorescentPatch, ReradiatedSpectrum, ReradiationUnderLight
 
 # matplotlib is slow to load.

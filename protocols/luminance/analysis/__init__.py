@@ -13,6 +13,7 @@ import numpy as np
 
 from labrig.analyse.frames import (
     IntactFrames,
+    glare_warning,
     intact_frames,
     require_calibrated_camera,
     steady_frames,
@@ -20,8 +21,7 @@ from labrig.analyse.frames import (
     timing_warnings,
     without_stray_light,
 )
-from labrig.analyse.glare import glare_warning
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import (
     bare_lamp_spectrum,
     camera_curves,
@@ -68,7 +68,7 @@ LINGERS, LINGERS_S = 0.95, 60.0
 AMBIENT, AMBIENT_SIGMAS = 0.1, 4.0
 
 
-def analyse(part: Part) -> LuminanceResult:
+def analyse(context: AnalysisContext) -> LuminanceResult:
     """Measure luminances of all patches by the card under the bare lamp.
 
     Raises
@@ -80,18 +80,20 @@ def analyse(part: Part) -> LuminanceResult:
     FitError
         There are too few readings.
     """
-    run, protocol = part.run, part.protocol
+    run, protocol = context.run, context.protocol
     frames, stray = without_stray_light(
-        intact_frames(run, part.overrides, LuminanceFrames.GLOW), part.inputs[BLANK_KIND]
+        intact_frames(run, context.overrides, LuminanceFrames.GLOW), context.inputs[BLANK_KIND]
     )
-    card = steady_frames(run, part.overrides, LuminanceFrames.CARD)
+    card = steady_frames(run, context.overrides, LuminanceFrames.CARD)
     if not card:
         raise DataError(f"{run.folder}: no card was photographed; go on with labrig resume")
-    require_calibrated_camera(part.inputs[CAMERA_KIND], run, run.frames(LuminanceFrames.GLOW))
-    excitation = _excitation(part)
-    regions = part.overrides.patches(protocol)
+    require_calibrated_camera(context.inputs[CAMERA_KIND], run, run.frames(LuminanceFrames.GLOW))
+    excitation = _excitation(context)
+    regions = context.overrides.patches(protocol)
     counts = {
-        name: glow_ratios(name, region, frames.decay, card, frames.dark, part.inputs[CAMERA_KIND])
+        name: glow_ratios(
+            name, region, frames.decay, card, frames.dark, context.inputs[CAMERA_KIND]
+        )
         for name, region in regions.items()
     }
     patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW), *stray]
@@ -100,14 +102,14 @@ def analyse(part: Part) -> LuminanceResult:
             "without dark frames the level without light is that of the files: its error, in no σ "
             "here, grows towards the dim end"
         )
-    camera = part.inputs[CAMERA_KIND]
+    camera = context.inputs[CAMERA_KIND]
     if camera is None or camera.glare is None:
         warnings += _veiled(frames, regions)
     for name, each in counts.items():
         if not _is_seen(each).any():
             warnings.append(f"{name}: no glow was seen in this patch, which is left out")
             continue
-        patches[name], told = _patch(each, name, excitation, part)
+        patches[name], told = _patch(each, name, excitation, context)
         warnings += [f"{name}: {line}" if len(counts) > 1 else line for line in told]
     if not patches:
         raise DataError(
@@ -125,12 +127,12 @@ def analyse(part: Part) -> LuminanceResult:
 
 
 def _patch(
-    counts: GlowRatios, name: str, excitation: ExcitationState, part: Part
+    counts: GlowRatios, name: str, excitation: ExcitationState, context: AnalysisContext
 ) -> tuple[PatchLuminance, list[str]]:
     """Return the luminances of a patch, and doubts about them."""
-    rig, protocol = part.rig, part.protocol
-    camera = camera_curves(rig, part.overrides.camera, part.inputs[LVF_KIND])
-    known = emission_of(part, name)
+    rig, protocol = context.rig, context.protocol
+    camera = camera_curves(rig, context.overrides.camera, context.inputs[LVF_KIND])
+    known = emission_of(context, name)
     colour, noise = _colour(counts, np.flatnonzero(_is_seen(counts).any(axis=1)))
     # A channel that does not see the glow has a value all the same, of its noise.
     colour = np.maximum(colour, noise)
@@ -147,7 +149,7 @@ def _patch(
     noise_sigma = 1000 * np.sqrt(np.square(counts.sigma) @ np.square(scale.weights))
     sigma = np.hypot(noise_sigma, counts.flicker * light)
     dark = 1000 * np.abs(counts.dark_sigma @ np.abs(scale.weights))
-    factors = tuple(_factors(counts, scale, part))
+    factors = tuple(_factors(counts, scale, context))
     constant = math.sqrt(sum(factor.relative_sigma**2 for factor in factors))
     steps = np.sqrt(constant**2 + counts.iso_sigma**2 + np.square(dark / np.maximum(light, dark)))
     order = _one_a_time(counts.t_s)
@@ -159,7 +161,7 @@ def _patch(
         required=protocol.requirements,
         colours=protocol.colours,
         excitation=_text(excitation),
-        origin=part.run.name,
+        origin=context.run.name,
     )
     last = int(np.searchsorted(counts.t_s, decay.visible_s.value if decay.visible_s else np.inf))
     last = min(last, len(light) - 1)
@@ -169,7 +171,7 @@ def _patch(
         ScaleFactor("dark level at the end", float(dark[last] / max(light[last], dark[last])),
                     "dark frames before the excitation", is_common=False),
     )  # fmt: skip
-    warnings = [*decay.warnings, *_warnings(counts, scale, part)]
+    warnings = [*decay.warnings, *_warnings(counts, scale, context)]
     return (
         PatchLuminance(
             decay=decay,
@@ -246,10 +248,12 @@ def _one_a_time(t_s: FloatArray) -> IntArray:
     return np.flatnonzero(np.concatenate([[True], np.diff(t_s) > 0]))
 
 
-def _factors(counts: GlowRatios, scale: ColourScale, part: Part) -> Iterator[ScaleFactor]:
+def _factors(
+    counts: GlowRatios, scale: ColourScale, context: AnalysisContext
+) -> Iterator[ScaleFactor]:
     """Yield the factors that all luminances have in common."""
-    reading = part.rig.optics.luminance
-    camera = part.inputs[CAMERA_KIND]
+    reading = context.rig.optics.luminance
+    camera = context.inputs[CAMERA_KIND]
     assert reading is not None
     meter = "luxmeter at the sample" if reading.at == "sample plane" else "meter on the card"
     yield ScaleFactor(f"{meter}, {reading.value}", reading.sigma, "rig file")
@@ -268,7 +272,7 @@ def _factors(counts: GlowRatios, scale: ColourScale, part: Part) -> Iterator[Sca
     yield ScaleFactor("colour: curves, lamp, emission", colour, scale.source, is_common=False)
 
 
-def _warnings(counts: GlowRatios, scale: ColourScale, part: Part) -> Iterator[str]:
+def _warnings(counts: GlowRatios, scale: ColourScale, context: AnalysisContext) -> Iterator[str]:
     """Yield doubts about scale and darkness."""
     doubt = scale.card_doubt(counts.card, counts.card_sigma)
     if doubt is not None:
@@ -276,7 +280,7 @@ def _warnings(counts: GlowRatios, scale: ColourScale, part: Part) -> Iterator[st
     if scale.doubt is not None:
         yield scale.doubt
     yield from _other_light(counts)
-    if part.rig.optics.luminance is not None and part.rig.optics.luminance.lamp is None:
+    if context.rig.optics.luminance is not None and context.rig.optics.luminance.lamp is None:
         yield (
             "the rig file does not say which lamp it has (optics: luminance: lamp): the same lux "
             "of another lamp excite another glow"
@@ -306,15 +310,15 @@ def _mesopic(scale: ColourScale, adaptation_mcd_per_m2: float | None) -> Measure
     return Measured(value, abs(slope) * ratio.sigma)
 
 
-def _excitation(part: Part) -> ExcitationState:
+def _excitation(context: AnalysisContext) -> ExcitationState:
     """Return how the sample was excited."""
-    protocol, reading = part.protocol, part.rig.optics.luminance
-    lux = illuminance_lx(part.rig)
+    protocol, reading = context.protocol, context.rig.optics.luminance
+    lux = illuminance_lx(context.rig)
     assert reading is not None
     conditions, rested_s = protocol.excitation.conditions, protocol.excitation.rested
-    charged_s = _charged_s(part.run)
+    charged_s = _charged_s(context.run)
     by_card = reading.at == "card"
-    card_sigma = card_error(card_reflectance(part.rig))[0] if by_card else 0.0
+    card_sigma = card_error(card_reflectance(context.rig))[0] if by_card else 0.0
     sigma = math.hypot(reading.sigma, card_sigma)
     return ExcitationState(
         standard=conditions.name,
@@ -322,7 +326,7 @@ def _excitation(part: Part) -> ExcitationState:
         illuminance=Measured(lux, sigma * lux, "lx"),
         charged_s=charged_s,
         rested_s=rested_s,
-        temperature_c=glow_temperature_c(part.run, protocol.rate_frames),
+        temperature_c=glow_temperature_c(context.run, protocol.rate_frames),
         deviations=tuple(conditions.deviations(reading.lamp, lux, charged_s, rested_s)),
     )
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import chdtrc
 
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.fit.spectrum import (
     CurveError,
     SpectralSystem,
@@ -124,7 +124,7 @@ class ColourScale:
         )
 
 
-def emission_of(part: Part, name: str) -> Emission | None:
+def emission_of(context: AnalysisContext, name: str) -> Emission | None:
     """Return the emission spectrum of a patch that the protocol names, or an earlier part measured.
 
     Raises
@@ -132,8 +132,8 @@ def emission_of(part: Part, name: str) -> Emission | None:
     UsageError
         What the protocol names is no material, run or table with an emission spectrum.
     """
-    measured = part.inputs.spectra.get(name) or part.inputs.spectra.get("")
-    named = part.protocol.emission
+    measured = context.inputs.spectra.get(name) or context.inputs.spectra.get("")
+    named = context.protocol.emission
     if named is None and measured is None:
         return None
     if named is not None and is_path(named) and Path(named).is_dir():

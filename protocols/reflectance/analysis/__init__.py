@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import StripFrames, StripPatch, for_each_patch
 from labrig.bench_optics import card_reflectance, lamp_spectrum
 from labrig.calibration import LVF_KIND, ReflectanceFile
@@ -44,7 +44,7 @@ class _Bench:
     card_sigma: FloatArray
 
 
-def analyse(part: Part) -> ReflectanceResult:
+def analyse(context: AnalysisContext) -> ReflectanceResult:
     """Measure albedo and total radiance factor of every patch.
 
     Raises
@@ -55,23 +55,27 @@ def analyse(part: Part) -> ReflectanceResult:
     DataError
         Frames are missing or damaged, no patch lies below the filter, or there is no light.
     """
-    calibrated = part.inputs[LVF_KIND]
+    calibrated = context.inputs[LVF_KIND]
     if calibrated is None or calibrated.on_sample is None or calibrated.before_camera is None:
         raise UsageError(
-            f"{part.run.folder}: no LVF is known before the camera and on the sample; run "
+            f"{context.run.folder}: no LVF is known before the camera and on the sample; run "
             "lvf_calibration, and name its run in the rig file (optics: {lvf: …}) or to labrig "
             "process --optics"
         )
-    frames, lamp, card = StripFrames(part), lamp_spectrum(part.rig), card_reflectance(part.rig)
+    frames, lamp, card = (
+        StripFrames(context),
+        lamp_spectrum(context.rig),
+        card_reflectance(context.rig),
+    )
     white, narrow, excited = both_arranged(
-        part, frames, calibrated, calibrated.before_camera, calibrated.on_sample
+        context, frames, calibrated, calibrated.before_camera, calibrated.on_sample
     )
     bench = _Bench(white, narrow, excited, card, _card_sigma(card))
     both = [patch for patch in white.patches if patch in narrow.patches]
     if not both:
         raise DataError("; ".join((*white.refused, *narrow.refused)))
     patches, warnings = for_each_patch(both, lambda patch: _patch(patch, bench))
-    run = part.run.name
+    run = context.run.name
     return ReflectanceResult(
         lamp=lamp.name,
         patches=patches,

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.acquire import DOOR
+from labrig.analyse.forward_model import channel_positions, conditioned_on_white, strip_system
 from labrig.analyse.frames import intact_frames
-from labrig.analyse.inputs import Part
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import Slices, StripFrames, StripPatch, slice_strip, strip_regions
-from labrig.analyse.strip_model import channel_positions, conditioned_on_white, strip_system
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import CAMERA_KIND, LvfFile
 from labrig.fit.reflectance import (
@@ -137,7 +137,11 @@ class Arranged:
 
 
 def both_arranged(
-    part: Part, frames: StripFrames, calibrated: LvfFile, before_camera: Strip, on_sample: Strip
+    context: AnalysisContext,
+    frames: StripFrames,
+    calibrated: LvfFile,
+    before_camera: Strip,
+    on_sample: Strip,
 ) -> tuple[Arranged, Arranged, Mapping[StripPatch, Luminescence | None]]:
     """Measure card, sample and glow along both strips, and what luminescence both may have.
 
@@ -148,11 +152,11 @@ def both_arranged(
     DataError
         Frames are missing, or no patch lies below the filter.
     """
-    is_direct = DOOR.key in part.rig.devices
-    white = _seen(part, frames, WHITE, calibrated, calibrated.lvf, before_camera)
+    is_direct = DOOR.key in context.rig.devices
+    white = _seen(context, frames, WHITE, calibrated, calibrated.lvf, before_camera)
     # Without a door the camera sees the sample through the filter that lies on it.
     below = calibrated.lvf if is_direct else calibrated.lvf.twice()
-    narrow = _seen(part, frames, NARROW, calibrated, below, on_sample)
+    narrow = _seen(context, frames, NARROW, calibrated, below, on_sample)
     whites, narrows, excited = {}, {}, {}
     for patch in white.patches:
         one = white.patches[patch]
@@ -162,7 +166,7 @@ def both_arranged(
                 other.scenes, one.scenes, one.centre_nm, other.centre_nm, is_direct=is_direct
             )
             narrows[patch] = other.strip(courses)
-            excited[patch] = _excited(one, other, lamp_spectrum(part.rig), is_direct=is_direct)
+            excited[patch] = _excited(one, other, lamp_spectrum(context.rig), is_direct=is_direct)
     return (
         Arranged(WHITE.name, whites, white.refused, white.drift),
         Arranged(NARROW.name, narrows, narrow.refused, narrow.drift),
@@ -225,7 +229,7 @@ class _Seen:
 
 
 def _seen(
-    part: Part,
+    context: AnalysisContext,
     frames: StripFrames,
     names: Arrangement,
     calibrated: LvfFile,
@@ -234,12 +238,12 @@ def _seen(
 ) -> _Seen:
     """Measure card, sample and glow along a strip, for every patch."""
     layout = sensor_layout(frames.dark[0])
-    slices, refused = slice_strip(strip_regions(part), strip, layout)
-    camera = camera_curves(part.rig, part.overrides.camera, calibrated)
-    lit, card = _lit(camera, lamp_spectrum(part.rig)), card_reflectance(part.rig)
+    slices, refused = slice_strip(strip_regions(context), strip, layout)
+    camera = camera_curves(context.rig, context.overrides.camera, calibrated)
+    lit, card = _lit(camera, lamp_spectrum(context.rig)), card_reflectance(context.rig)
     patches, drifts = {}, []
     for patch, regions in slices.items():
-        scenes = _Scenes.of(part, frames, names, regions)
+        scenes = _Scenes.of(context, frames, names, regions)
         light, centre_nm = _light_system(lvf, strip, layout, regions, lit)
         light = _known_by_card(light, scenes.card, card)
         scenes = scenes.within(_in_band(light, centre_nm).reshape(scenes.sample.value.shape))
@@ -261,12 +265,14 @@ class _Scenes:
     glow_times_s: tuple[float, ...]
 
     @classmethod
-    def of(cls, part: Part, frames: StripFrames, names: Arrangement, regions: Slices) -> "_Scenes":
-        glow_frames = intact_frames(part.run, part.overrides, names.glow).decay
+    def of(
+        cls, context: AnalysisContext, frames: StripFrames, names: Arrangement, regions: Slices
+    ) -> "_Scenes":
+        glow_frames = intact_frames(context.run, context.overrides, names.glow).decay
         each = [replace(frame, unit=f"glow-{n}") for n, frame in enumerate(glow_frames)]
         lit: list[SeriesFrame] = [*frames.of(names.card), *frames.of(names.sample)]
         values = region_values(
-            [*lit, *each], regions, frames.dark, part.inputs[CAMERA_KIND], is_evened=True
+            [*lit, *each], regions, frames.dark, context.inputs[CAMERA_KIND], is_evened=True
         )
         cards = [values[f"card-{names.name}-{n}"] for n in (1, 2)
                  if f"card-{names.name}-{n}" in values]  # fmt: skip

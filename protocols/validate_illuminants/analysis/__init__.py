@@ -7,11 +7,10 @@ from typing import Literal
 
 import numpy as np
 
-from labrig.analyse.card_checks import UsableLights, usable_lights
-from labrig.analyse.colours import camera_matrix
-from labrig.analyse.inputs import Part
+from labrig.analyse.card_checks import UsableLights, left_warnings, usable_lights
+from labrig.analyse.chart_scene import camera_matrix
+from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.lit_patches import LitPatch, lit_patches
-from labrig.analyse.lit_warnings import left_warnings
 from labrig.bench_optics import (
     LedExposure,
     camera_curves,
@@ -22,15 +21,16 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.optics import CameraResponse, is_narrow
 from labrig.protocols.steps.led_scenes import CARD
-from labrig.protocols.validate_illuminants.analysis.chart import ODD_CHART, chart_values
 from labrig.protocols.validate_illuminants.analysis.colours import (
+    ODD_CHART,
     ColourScale,
     chart_matrix,
+    chart_values,
     difference,
 )
-from labrig.protocols.validate_illuminants.analysis.materials import matrices_of
 from labrig.protocols.validate_illuminants.analysis.prediction import (
     PredictedValues,
+    matrices_of,
     predicted_values,
     with_scales_of_samples,
 )
@@ -42,7 +42,7 @@ from labrig.results import LampComparison, LampPatch, MatrixOnBands, SeenColour,
 ODD_CHI2, ODD_PULL = 2.0, 4.0
 
 
-def analyse(part: Part) -> ValidateIlluminantsResult:
+def analyse(context: AnalysisContext) -> ValidateIlluminantsResult:
     """Compare photographs under each lamp with predictions.
 
     Raises
@@ -54,14 +54,17 @@ def analyse(part: Part) -> ValidateIlluminantsResult:
         Frames are missing or damaged, no lamp can be used, or there is no colour chart where one is
         expected.
     """
-    protocol, names = part.protocol, part.protocol.lamps
+    protocol, names = context.protocol, context.protocol.lamps
     matrices = matrices_of(protocol)
-    lights = illuminant_exposures(part.rig, "rig.yaml")
+    lights = illuminant_exposures(context.rig, "rig.yaml")
     if unknown := [lamp for lamp in names if lamp not in lights]:
         raise UsageError(f"rig.yaml: expected lamps called {', '.join(unknown)}, got none")
-    camera, white = camera_curves(part.rig, part.overrides.camera), card_reflectance(part.rig)
-    cards = lit_patches(part, IlluminantFrames.CARD, CARD, names)
-    samples = lit_patches(part, IlluminantFrames.SAMPLE, SAMPLE, names)
+    camera, white = (
+        camera_curves(context.rig, context.overrides.camera),
+        card_reflectance(context.rig),
+    )
+    cards = lit_patches(context, IlluminantFrames.CARD, CARD, names)
+    samples = lit_patches(context, IlluminantFrames.SAMPLE, SAMPLE, names)
     spectra = {name: lights[name].light for name in names}
     usable = usable_lights(names, spectra, camera, white, cards, samples, "lamp")
     warnings = usable.warnings
@@ -81,14 +84,14 @@ def analyse(part: Part) -> ValidateIlluminantsResult:
         samples,
         cards,
     )
-    colours = _colours(part, lights, camera, usable, next(iter(predicted.values())).white)
+    colours = _colours(context, lights, camera, usable, next(iter(predicted.values())).white)
     warnings += _chart_warnings(colours)
     compared = {
         lamp: _lamp(row, lamps[row], samples, cards, predicted, colours)
         for row, lamp in enumerate(used)
     }
     warnings += _verdict_warnings(compared)
-    regions = part.overrides.patches(protocol)
+    regions = context.overrides.patches(protocol)
     without_sigma = tuple(
         name
         for name, matrix in matrices.items()
@@ -126,15 +129,15 @@ class _Colours:
 
 
 def _colours(
-    part: Part,
+    context: AnalysisContext,
     lights: Mapping[str, LedExposure],
     camera: CameraResponse,
     usable: UsableLights,
     white: FloatArray,
 ) -> _Colours:
-    named, used = part.protocol.balanced, list(usable.by_row.values())
+    named, used = context.protocol.balanced, list(usable.by_row.values())
     # A chart shows the light in which it was photographed, whatever its name.
-    balance = usable.light_of.get(named, named) if part.protocol.chart else named
+    balance = usable.light_of.get(named, named) if context.protocol.chart else named
     if balance not in used:
         raise DataError(
             f"the lamp '{balance}', in whose light white is to be white, cannot be used; name "
@@ -145,8 +148,8 @@ def _colours(
         raise UsageError(
             f"the lamp '{balance}' has no white; name a lamp of white light as 'balance'"
         )
-    if part.protocol.chart:
-        matrix, off = chart_matrix(chart_values(part, named), light)
+    if context.protocol.chart:
+        matrix, off = chart_matrix(chart_values(context, named), light)
         white_xyz = matrix @ white[used.index(balance)]
         return _Colours(balance, white_xyz, dict.fromkeys(used, matrix), "chart", off)
     matrices = {

@@ -1,4 +1,4 @@
-"""From a camera's values to colours, and how far a photograph is from its prediction."""
+"""Colours of patches and of a ColorChecker under a lamp, and how far they are from predictions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,10 @@ from typing import Self
 
 import numpy as np
 
+from labrig.analyse.inputs import AnalysisContext
+from labrig.analyse.lit_patches import lit_patches
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.errors import DataError
 from labrig.optics import (
     CIE_1931,
     Spectrum,
@@ -16,6 +19,8 @@ from labrig.optics import (
     read_colour_chart,
     white_xyz,
 )
+from labrig.protocols.validate_illuminants.protocol import CHART, IlluminantFrames
+from labrig.reduce import find_colour_chart
 from labrig.results import Measured
 
 #: Number of draws of errors.
@@ -149,3 +154,32 @@ def difference(
     by_errors = delta_e(scale.lab(predicted + errors), expected)
     value = Measured(float(delta_e(found, expected)), float(np.std(drawn)))
     return value, float(np.sqrt(np.mean(by_errors**2)))
+
+
+#: ΔE2000 of a chart's patches, on average, from which it is not what was taken for one.
+ODD_CHART = 6.0
+
+
+def chart_values(context: AnalysisContext, lamp: str) -> FloatArray:
+    """Return the values of the chart's 24 patches in DN/s, shape (24, k).
+
+    Raises
+    ------
+    DataError
+        There is no photograph of a chart, none is found in it, or all exposures clip.
+    """
+    role = IlluminantFrames.CHART
+    frames = context.run.frames(role)
+    if not frames:
+        raise DataError(
+            f"{context.run.folder}: there are no complete '{role}' frames; go on with: "
+            "labrig resume "
+            f"{context.run.folder}"
+        )
+    # The shortest exposure of a bracket is metered: nothing clips.
+    metered = min(frames, key=lambda frame: frame.exposure_s)
+    regions = {
+        f"{number:02d}": region for number, region in enumerate(find_colour_chart(metered.path))
+    }
+    patches = lit_patches(context, role, CHART, [lamp], patches=regions)
+    return np.array([patch.without_rest().value[0] for _, patch in sorted(patches.items())])

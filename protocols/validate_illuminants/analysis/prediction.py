@@ -1,4 +1,4 @@
-"""What a camera sees of a matrix under lamps, and the errors of that.
+"""Prediction of what a camera sees of a sample's matrix under lamps, and its errors.
 
 Errors are those of the system (lamps' spectra, camera's curves, card), as the card leaves them, and
 of the matrix. A result keeps σ of each number of the matrix only; neighbouring numbers are taken to
@@ -7,17 +7,20 @@ err together, over the distances below, as their estimates do.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from labrig.analyse.lit_patches import LitPatch
-from labrig.analyse.lit_system import CARD_COURSE, CARD_SIGMA, exposure_of
+from labrig.analyse.lit_patches import CARD_COURSE, CARD_SIGMA, LitPatch, exposure_of
 from labrig.bench_optics import LedExposure
 from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
 from labrig.foundation.arrays import FloatArray
-from labrig.material import ReradiationMatrix
+from labrig.foundation.errors import UsageError
+from labrig.material import ReradiationMatrix, read_any_material
 from labrig.optics import CameraResponse, Transmittance
+from labrig.results import read_result
 
 #: Least light of the card, over that under the brightest lamp, each per power of the lamp, from
 #: which the card tells how bright a lamp is. A dark one shows the tails of its spectrum.
@@ -222,3 +225,48 @@ def _root(nm: FloatArray, correlation_nm: float) -> FloatArray:
     values, vectors = np.linalg.eigh(np.exp(-(off**2) / 2))
     kept = values > 1e-6 * values.max()
     return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
+
+
+def matrices_of(protocol: Any) -> dict[str, ReradiationMatrix]:
+    """Return the matrix of each patch that the protocol's key `fluorescence` names.
+
+    Raises
+    ------
+    UsageError
+        None is named, the run is none of led_fluorescence or has other patches, or a material does
+        not fluoresce or is relative.
+    """
+    named = protocol.fluorescence
+    if named is None:
+        raise UsageError(
+            "expected 'fluorescence:' in the protocol, a run of led_fluorescence or a material for "
+            "each patch; add it to the run's protocol.yaml, then process the run again"
+        )
+    if isinstance(named, str):
+        return _of_run(named, list(protocol.patches))
+    return {name: _of_material(named[name]) for name in protocol.patches}
+
+
+def _of_run(run: str, patches: list[str]) -> dict[str, ReradiationMatrix]:
+    result = read_result(Path(run))
+    matrices = result.provides().get("matrices")
+    if matrices is None:
+        raise UsageError(f"{run}: expected a run of led_fluorescence, got one of {result.kind}")
+    if missing := [name for name in patches if name not in matrices]:
+        raise UsageError(
+            f"{run}: expected a patch '{missing[0]}', got {', '.join(matrices) or 'none'}; "
+            "give the patches the names that they had there"
+        )
+    return {name: matrices[name].named(name) for name in patches}
+
+
+def _of_material(named: str) -> ReradiationMatrix:
+    material = read_any_material(named)
+    if not isinstance(material, ReradiationMatrix):
+        raise UsageError(f"{named}: expected a fluorescent material, got a phosphor")
+    if material.unit == "relative":
+        raise UsageError(
+            f"{named}: its re-radiation is relative, so that nothing can be predicted; expected "
+            "fractions of the incident light"
+        )
+    return material

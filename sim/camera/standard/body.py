@@ -14,7 +14,7 @@ from ..objects import CARD_ID, SECOND_CARD_ID, ObjectStore
 from ..operations import Event
 from ..photograph import Photograph, Sensor
 from ..shutter import FOCUS_S, METERING_S, READOUT_S, Exposure, Shutter, Stage
-from ..vocabulary import ObjectFormat, ResponseCode, StandardEvent
+from ..vocabulary import ObjectFormat, Operation, ResponseCode, StandardEvent
 from .properties import SHUTTER_TIMES, StandardProperties
 
 #: Time between two files of a photograph, and before the report of its end.
@@ -36,12 +36,15 @@ class StandardHabits:
         Whether everything is written once more, on a second card.
     shutter_times
         Actual time in seconds by reported time, in 0.1 ms.
+    release
+        Code of the operation that releases the shutter.
     """
 
     files: tuple[ObjectFormat, ...] = (ObjectFormat.DNG,)
     end_reported: Literal["after", "before", "never"] = "after"
     has_second_card: bool = False
     shutter_times: Mapping[int, float] = field(default_factory=lambda: SHUTTER_TIMES)
+    release: int = Operation.INITIATE_CAPTURE
 
 
 class _Developed(Photograph):
@@ -102,6 +105,11 @@ class StandardBody:
     def formats(self) -> tuple[ObjectFormat, ...]:
         """Formats of the files that are written of a photograph."""
         return self._habits.files
+
+    @property
+    def release_code(self) -> int:
+        """Code of the operation that releases the shutter."""
+        return self._habits.release
 
     def forget_host(self) -> None:
         """End the session: later events are lost."""

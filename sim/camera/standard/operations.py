@@ -27,7 +27,7 @@ class StandardOperations:
         self.model = _MODEL
         self.table: dict[int, Handler] = {
             **ObjectOperations(body.objects).table,
-            Operation.INITIATE_CAPTURE: Handler(only_code(body.initiate_capture), 0, 2),
+            body.release_code: Handler(only_code(body.initiate_capture), 0, 2),
             Operation.GET_DEVICE_PROP_DESC: Handler(self._prop_desc, 1, 1),
             Operation.GET_DEVICE_PROP_VALUE: Handler(self._prop_value, 1, 1),
             Operation.SET_DEVICE_PROP_VALUE: Handler(

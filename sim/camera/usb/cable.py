@@ -1,12 +1,44 @@
-"""The USB cable: the time of a transfer, and being pulled out."""
+"""The USB cable: the time of a transfer, being pulled out, and the camera switching itself off."""
 
 import math
+from collections.abc import Callable
 
-from labrig.foundation.clock import VirtualClock
+from labrig.foundation.clock import Clock, VirtualClock
 
 from ... import usb_errors
 from ..faults import CameraFaults
-from ..power import AutoPowerOff
+
+
+class AutoPowerOff:
+    """Switch that is off for good after `after_s` seconds without a request; 0 for never.
+
+    Parameters
+    ----------
+    clock
+        The room's clock.
+    after_s
+        Time in seconds that is set in the menu.
+    exposing_until_s
+        Function that returns the end of the exposure: a camera that exposes stays on.
+    """
+
+    def __init__(self, clock: Clock, after_s: float, exposing_until_s: Callable[[], float]) -> None:
+        self._clock = clock
+        self._after_s = after_s
+        self._exposing_until_s = exposing_until_s
+        self._spoken_to_s = clock.now()
+
+    @property
+    def is_off(self) -> bool:
+        """Whether the camera is off; only a person can switch it on again."""
+        idle_since_s = max(self._spoken_to_s, self._exposing_until_s())
+        return 0 < self._after_s < self._clock.now() - idle_since_s
+
+    def put_off(self) -> None:
+        """Note a request to the camera, which postpones its switching-off."""
+        if not self.is_off:
+            self._spoken_to_s = self._clock.now()
+
 
 #: Time of host controller and scheduler for every transfer (one high-speed microframe).
 TRANSACTION_S = 125e-6

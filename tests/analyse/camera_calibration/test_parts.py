@@ -7,9 +7,8 @@ from hypothesis import given, settings, strategies as st
 from labrig.calibration import Noise
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
-from labrig.protocols.camera_calibration.analysis.bend import Bend, fit_bend
 from labrig.protocols.camera_calibration.analysis.factors import CardFrame, fit_factors
-from labrig.protocols.camera_calibration.analysis.linearity import fit_linearity
+from labrig.protocols.camera_calibration.analysis.linearity import Bend, fit_bend, fit_linearity
 from labrig.protocols.camera_calibration.analysis.photon_transfer import (
     Pair,
     measure_pair,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Overrides, Part
+from labrig.analyse import AnalysisContext, Overrides
 from labrig.bench_optics import camera_curves
 from labrig.fit.camera_curves import GRID_NM
 from labrig.foundation.errors import DataError, LabrigError, UsageError
@@ -21,9 +21,9 @@ from tests.fit.unknown_cameras import rms_of_curves
 from tests.results.made import assert_read_back
 
 
-def asked_anew(part: Part, **change: Any) -> Part:
+def asked_anew(context: AnalysisContext, **change: Any) -> AnalysisContext:
     """The run as if its protocol had said something else of what is made of it."""
-    return replace(part, protocol=part.protocol.model_copy(update=change))
+    return replace(context, protocol=context.protocol.model_copy(update=change))
 
 
 @pytest.fixture(scope="module")

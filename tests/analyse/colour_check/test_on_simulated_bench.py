@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Inputs, Part
+from labrig.analyse import AnalysisContext, Inputs
 from labrig.calibration import LVF_KIND
 from labrig.foundation.errors import UsageError
 from labrig.optics import CURVES_FILE
@@ -20,10 +20,10 @@ from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera
 from tests.results.made import assert_read_back
 
 
-def with_optics(part: Part, **changed: str) -> Part:
+def with_optics(context: AnalysisContext, **changed: str) -> AnalysisContext:
     """The run as if its rig file had named other curves."""
-    optics = part.rig.optics.model_copy(update=changed)
-    return replace(part, rig=part.rig.model_copy(update={"optics": optics}))
+    optics = context.rig.optics.model_copy(update=changed)
+    return replace(context, rig=context.rig.model_copy(update={"optics": optics}))
 
 
 @pytest.fixture(scope="module")

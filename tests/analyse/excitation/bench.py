@@ -10,7 +10,7 @@ from labrig.material import read_material
 from labrig.optics import SLICES, Strip
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import BURNING_K, filament_spectrum
-from labrig.sim.lvf import Lvf
+from labrig.sim.layout import Lvf
 from labrig.sim.phosphor import band_cells
 from tests.quick_yaml import read_quickly
 

@@ -7,8 +7,8 @@ import pytest
 
 from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import read_material
-from labrig.protocols.excitation.analysis.evenness import evened, evenness
-from labrig.protocols.excitation.analysis.flicker import common_flicker
+from labrig.protocols.excitation.analysis import common_flicker
+from labrig.protocols.excitation.analysis.charging_series import evened, evenness
 from tests.fit.charged_samples import BARE, LVF, Bench
 from tests.results.made_excitation import excitation_result
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labrig.calibration import PatchReflectance
-from labrig.protocols.excitation.analysis.density import largest_density
+from labrig.protocols.excitation.analysis.material import largest_density
 from labrig.results import PRIOR_DENSITY, DensityBasis
 
 BANDS_NM = (400.0, 450.0, 500.0, 700.0)

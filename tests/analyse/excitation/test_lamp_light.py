@@ -11,8 +11,8 @@ from labrig.protocols.excitation.analysis.lamp_light import (
     band_sigma,
     mode_kinds,
     site_modes,
+    weighted_over_mean,
 )
-from labrig.protocols.excitation.analysis.warmth import weighted_over_mean
 from tests.analyse.excitation.bench import true_irradiance
 
 

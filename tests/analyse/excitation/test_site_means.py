@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labrig.protocols.excitation.analysis.site_means import site_means, site_weights
+from labrig.protocols.excitation.analysis.charging_series import site_means, site_weights
 from labrig.reduce import SensorLayout
 from tests.analyse.excitation.bench import true_irradiance
 

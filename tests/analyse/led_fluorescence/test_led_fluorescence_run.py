@@ -179,9 +179,9 @@ def _on_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:
     def change(rig: dict[str, Any]) -> None:
         channels = rig["devices"]["leds"]["channels"]
         rig["devices"]["leds"] = {
-            "driver": "numato_led_bank",
+            "driver": "numato",
             "address": "sim://room/relays",
-            "relays": {
+            "channels": {
                 led: {"relay": relay}
                 | {key: channels[led][key] for key in ("centre", "fwhm", "settling")}
                 for led, relay in relays.items()
@@ -348,7 +348,7 @@ def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Pat
 @pytest.mark.campaign
 def test_a_lamp_that_does_not_light_is_left_out_and_the_leds_go_on(tmp_path: Path) -> None:
     def unplugged(rig: dict[str, Any]) -> None:
-        rig["devices"]["illuminants"]["lamps"]["halogen"]["relay"] = 7
+        rig["devices"]["illuminants"]["channels"]["halogen"]["relay"] = 7
 
     asked = FEW | {"lamps": ["halogen"]}
     result = analyse(part_of(record(tmp_path, asked, unplugged)))

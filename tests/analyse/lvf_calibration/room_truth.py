@@ -10,7 +10,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.region import region_pixels
 from labrig.optics import Strip
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
-from labrig.sim.lvf import Lvf, pieces
+from labrig.sim.layout import Lvf, pieces
 from labrig.sim.phosphor import band_cells
 from labrig.sim.simulation import Simulation
 from tests.quick_yaml import read_quickly

@@ -8,7 +8,7 @@ import pytest
 from labrig.foundation.arrays import FloatArray
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
-from labrig.protocols.lvf_calibration.analysis.filters import (
+from labrig.protocols.lvf_calibration.analysis import (
     NO_FILTER,
     Bench,
     FilterScenes,

@@ -8,7 +8,7 @@ import pytest
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
 from labrig.optics import Spectrum, Strip, nominal_lvf
-from labrig.protocols.lvf_calibration.analysis.lines import (
+from labrig.protocols.lvf_calibration.analysis import (
     place_on_sample,
     shifted_by_stripes,
     strip_lines,

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.analyse.lit_patches import LitPatch
-from labrig.analyse.lit_system import CARD_COURSE, CARD_SIGMA, exposure_of
+from labrig.analyse.lit_patches import CARD_COURSE, CARD_SIGMA, LitPatch, exposure_of
 from labrig.bench_optics import LedExposure
 from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL

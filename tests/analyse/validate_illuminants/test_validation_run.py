@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Part
+from labrig.analyse import AnalysisContext
 from labrig.foundation.errors import DataError, UsageError
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
 from labrig.protocols.validate_illuminants.analysis import analyse
@@ -92,14 +92,14 @@ def test_the_result_is_read_back_and_its_page_says_what_it_is(run: Path) -> None
 def _with_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:
     def change(rig: dict[str, Any]) -> None:
         for lamp, relay in relays.items():
-            rig["devices"]["illuminants"]["lamps"][lamp]["relay"] = relay
+            rig["devices"]["illuminants"]["channels"][lamp]["relay"] = relay
 
     return change
 
 
-def asked_anew(part: Part, change: dict[str, Any]) -> Part:
+def asked_anew(context: AnalysisContext, change: dict[str, Any]) -> AnalysisContext:
     """The run as if its protocol had said something else of what is compared."""
-    return replace(part, protocol=part.protocol.model_copy(update=change))
+    return replace(context, protocol=context.protocol.model_copy(update=change))
 
 
 def test_another_matrix_differs_and_is_named(run: Path) -> None:
@@ -120,7 +120,7 @@ def test_a_lamp_that_does_not_light_is_left_out_and_named(tmp_path: Path) -> Non
 def test_lamps_in_another_order_count_as_those_that_were_lit(run: Path) -> None:
     part = part_of(run)
     entry = part.rig.devices["illuminants"]
-    lamps = entry.settings()["lamps"]
+    lamps = entry.settings()["channels"]
     swapped = lamps | {"daylight": lamps["halogen"], "halogen": lamps["daylight"]}
     devices = part.rig.devices | {"illuminants": entry.model_copy(update={"lamps": swapped})}
     rig = part.rig.model_copy(update={"devices": devices})

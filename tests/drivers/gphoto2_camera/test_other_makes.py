@@ -231,7 +231,7 @@ def test_the_extra_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_planning_needs_neither_camera_nor_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     settings = Gphoto2Camera.Settings.model_validate({"isos": [1600, 100], "frame_time": "3 s"})
-    offers = Gphoto2Camera.declared_offers(settings)
+    offers = settings.planned_offers()
     assert offers.isos == (100, 1600)
     assert (offers.exposures_s[0], offers.exposures_s[-1]) == (1 / 8192, 32.0)
     assert offers.overhead_s == 3.0

@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 
 from labrig.drivers.ptp.device_info import parse_device_info
 from labrig.drivers.ptp.standard.object_info import parse_object_info
-from labrig.drivers.ptp.standard.property_description import (
+from labrig.drivers.ptp.standard.properties import (
     PropertyDescription,
     parse_property_description,
 )

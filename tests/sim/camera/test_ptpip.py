@@ -228,7 +228,7 @@ def test_what_the_command_refuses(
     labrig: Callable[..., Ended], bench: Bench, tmp_path: Path, arguments: list[str], said: str
 ) -> None:
     rig = tmp_path / "rig.yaml"
-    rig.write_text("name: x\ndevices: {lamp: {driver: numato_relay, address: COM3, relay: 1}}\n")
+    rig.write_text("name: x\ndevices: {lamp: {driver: numato, address: COM3, relay: 1}}\n")
     known = {"RIG": str(rig), "TAKEN": str(bench.server.port)}
     ended = labrig("sim", "camera", *(known.get(argument, argument) for argument in arguments))
     assert ended.code == 2

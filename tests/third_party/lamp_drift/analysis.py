@@ -3,18 +3,18 @@
 import numpy as np
 
 import labrig
-from labrig.analyse import Part
+from labrig.analyse import AnalysisContext
 from labrig.results import Measured
 from lamp_drift.calibration import DRIFT_KIND
 from lamp_drift.protocol import DriftFrames
 from lamp_drift.result import LampDriftResult
 
 
-def analyse(part: Part) -> LampDriftResult:
+def analyse(context: AnalysisContext) -> LampDriftResult:
     """Fit a straight line to the light of the card, and compare its slope with the rig file's."""
-    frames = part.run.frames(DriftFrames.CARD)
+    frames = context.run.frames(DriftFrames.CARD)
     green = [
-        labrig.measure(labrig.read_raw(frame.path), part.protocol.region).channels["G"]
+        labrig.measure(labrig.read_raw(frame.path), context.protocol.region).channels["G"]
         for frame in frames
     ]
     time_s = np.array([frame.start_time - frames[0].start_time for frame in frames])
@@ -24,7 +24,7 @@ def analyse(part: Part) -> LampDriftResult:
     (slope, _), covariance = np.polyfit(time_s, relative, 1, cov=True)
     drift = Measured(float(slope), float(np.sqrt(covariance[0, 0])), "1/s")
     change_sigmas = None
-    earlier = part.inputs[DRIFT_KIND]
+    earlier = context.inputs[DRIFT_KIND]
     if earlier is not None:
         sigma_per_s = np.hypot(drift.sigma, earlier.drift_sigma_per_s)
         change_sigmas = float((drift.value - earlier.drift_per_s) / sigma_per_s)

@@ -20,7 +20,7 @@ class DriftFile(FrozenModel):
 
 
 #: A rig file names it by `optics: {lamp_drift: …}`;
-#: an analysis has it as `part.inputs[DRIFT_KIND]`.
+#: an analysis has it as `context.inputs[DRIFT_KIND]`.
 DRIFT_KIND = CalibrationKind(
     name="lamp_drift",
     protocol="lamp_drift",

@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 import labrig
-from labrig.acquire import LAMP, Lamp
+from labrig.acquire import LAMP, Lamp, load_driver
 from labrig.foundation.clock import VirtualClock
-from my_relay.driver import MyRelay
 
 RIG = Path(__file__).parents[1] / "rig.yaml"
 
@@ -48,8 +47,9 @@ def reads(state: bytes) -> tuple[bytes, bytes]:
     return b"relay read 3\r", b"relay read 3\n\r" + state + b"\n\r>"
 
 
-def relay(wire: Wire) -> MyRelay:
-    return MyRelay("COM3", MyRelay.Settings(relay=3), wire)
+def relay(wire: Wire) -> Lamp:
+    lamp = load_driver("lamp", "my_relay", "a test")
+    return lamp("COM3", lamp.Settings(relay=3), wire)
 
 
 def test_the_bytes_on_the_wire() -> None:

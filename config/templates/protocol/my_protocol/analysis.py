@@ -3,16 +3,16 @@
 import numpy as np
 
 import labrig
-from labrig.analyse import Part
+from labrig.analyse import AnalysisContext
 from labrig.results import Measured
 from my_protocol.protocol import MyProtocolFrames
 from my_protocol.result import MyProtocolResult
 
 
-def analyse(part: Part) -> MyProtocolResult:
+def analyse(context: AnalysisContext) -> MyProtocolResult:
     """Return the level of the glow over time, and the fraction of it that is left at the end."""
-    frames = part.run.frames(MyProtocolFrames.GLOW)
-    region = part.protocol.region
+    frames = context.run.frames(MyProtocolFrames.GLOW)
+    region = context.protocol.region
     green = [labrig.measure(labrig.read_raw(frame.path), region).channels["G"] for frame in frames]
     exposure_s = np.array([frame.exposure_s for frame in frames])
     level = np.array([channel.mean for channel in green]) / exposure_s

@@ -11,15 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
-from labrig.material.reradiation.formats.band_fractions import band_fractions, regular_grid
 from labrig.material.reradiation.formats.text_rows import (
     Line,
+    band_fractions,
     check_fractions,
     check_wavelengths,
     filled_lines,
     number,
     numbers,
     one_line,
+    regular_grid,
     shown,
 )
 from labrig.material.reradiation.matrix import ReradiationMatrix

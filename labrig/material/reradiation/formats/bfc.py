@@ -9,14 +9,15 @@ are fractions per band, and reflectance where both wavelengths are the same.
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
-from labrig.material.reradiation.formats.band_fractions import band_fractions, regular_grid
 from labrig.material.reradiation.formats.text_rows import (
     Line,
+    band_fractions,
     check_fractions,
     check_wavelengths,
     filled_lines,
     numbers,
     one_line,
+    regular_grid,
     shown,
 )
 from labrig.material.reradiation.matrix import SAME_NM, ReradiationMatrix

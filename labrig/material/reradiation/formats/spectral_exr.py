@@ -23,9 +23,9 @@ from labrig.foundation import colour_science
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.exr_file import read_exr, read_exr_header, write_exr as write_exr_file
-from labrig.material.reradiation.formats.band_fractions import check_is_absolute
 from labrig.material.reradiation.formats.text_rows import (
     check_fractions,
+    check_is_absolute,
     check_wavelengths,
     one_line,
     shown,

@@ -83,12 +83,12 @@ class TestOffers:
         _, camera = long_bench()
         assert camera.offers().exposures_s == (1 / 128, 1 / 64, 1.0, 32.0, 64.0, 128.0)
         settings = PtpCamera.Settings.model_validate({"longest_exposure": "300 s"})
-        assert PtpCamera.declared_offers(settings).exposures_s[-4:] == (32.0, 64.0, 128.0, 256.0)
+        assert settings.planned_offers().exposures_s[-4:] == (32.0, 64.0, 128.0, 256.0)
 
     def test_none_unless_the_rig_file_asks(self) -> None:
         b = bench(ToyEos(WITH_COMMANDS))
         assert max(b.connect().offers().exposures_s) == 32.0
-        assert max(PtpCamera.declared_offers(PtpCamera.Settings()).exposures_s) == 32.0
+        assert max(PtpCamera.Settings().planned_offers().exposures_s) == 32.0
 
     def test_none_where_the_camera_has_none(self) -> None:
         b = bench(ToyEos(WITH_COMMANDS))

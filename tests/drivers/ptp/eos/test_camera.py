@@ -65,7 +65,7 @@ def test_offers_follow_the_camera() -> None:
 
 def test_declared_offers_are_thirds_of_stops_by_their_true_times() -> None:
     settings = PtpCamera.Settings.model_validate({"longest_exposure": "1 s", "isos": [400, 100]})
-    offers = PtpCamera.declared_offers(settings)
+    offers = settings.planned_offers()
     assert offers.exposures_s[-1] == 1.0
     assert offers.exposures_s[0] == 1 / 8192
     ratios = {b / a for a, b in zip(offers.exposures_s, offers.exposures_s[1:], strict=False)}
@@ -78,7 +78,7 @@ def test_declared_offers_are_thirds_of_stops_by_their_true_times() -> None:
         ({"frame_pixels": [5634, 3752]}, 1.5 * 5634 * 3752),
     ):
         settings = PtpCamera.Settings.model_validate(given)
-        assert PtpCamera.declared_offers(settings).frame_bytes == frame_bytes
+        assert settings.planned_offers().frame_bytes == frame_bytes
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Ways in which a PTP container or PTP/IP packet comes to harm on its way."""
+"""Ways in which a PTP container comes to harm on its way."""
 
 import random
 from collections import Counter, deque
@@ -7,7 +7,7 @@ from collections.abc import Callable
 #: Numbers at which sizes, counts and codes go wrong.
 EDGES = (0, 1, 7, 8, 11, 12, 13, 255, 256, 511, 512, 0x7FFF, 0xFFFF, 0x10000, 0x400000)
 EDGES_32 = (*EDGES, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFE, 0xFFFFFFFF)
-#: Bytes of the longest header of either transport: what a mutation is most telling in.
+#: Bytes of the longest header, parameters included: where a mutation is most telling.
 HEADER_BYTES = 18
 MAX_GARBAGE_BYTES = 2000
 KEPT = 8

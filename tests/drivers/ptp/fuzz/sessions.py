@@ -1,7 +1,7 @@
 """Whole sessions with a camera whose containers come to harm on the way, either way.
 
 A case is one harmed container. The real driver talks to the simulated cameras, a Canon EOS and one
-that knows the standard only, over a USB bus or a network that flips bits, cuts off, repeats, swaps,
+that knows the standard only, over a USB bus that flips bits, cuts off, repeats, swaps,
 loses, lengthens and invents containers. All time is virtual. What must hold:
 
 - the driver raises nothing but `DeviceError`, one line each, that shows what came and says what to
@@ -28,7 +28,7 @@ from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError
 from tests.counterparts.served import EOS, EPOCH_S, STANDARD, camera_on
 
-from .lines import LiveFilm, Transport, over_network, over_usb
+from .lines import LiveFilm, Transport, over_usb
 from .mutations import Mutator
 
 #: Lab time in which a session must be over, whatever came: some tens of time-outs.
@@ -62,9 +62,7 @@ class Way:
 WAYS = MappingProxyType(
     {
         "camera to driver, USB": Way(over_usb, harms_camera=False),
-        "camera to driver, PTP/IP": Way(over_network, harms_camera=False),
         "driver to camera, USB": Way(over_usb, harms_camera=True),
-        "driver to camera, PTP/IP": Way(over_network, harms_camera=True),
     }
 )
 

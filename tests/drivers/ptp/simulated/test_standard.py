@@ -1,6 +1,7 @@
 """The PTP driver on a simulated camera that knows the PTP standard only."""
 
 from collections.abc import Callable
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import pytest
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake
 from labrig.acquire.values import Frame
 from labrig.drivers.ptp import PtpCamera
+from labrig.drivers.ptp.standard import camera as standard_camera
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import DeviceError, DeviceLostError
 from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera, StandardHabits
@@ -277,3 +279,22 @@ def test_a_whole_decay_is_measured_with_it(
     ended = labrig("run", make_protocol(), *arguments)
     assert ended.code == 0, ended.err
     assert len(list(Path(ended.out.splitlines()[-1], "frames").glob("*.dng"))) > 10
+
+
+class OfItsMaker(IntEnum):
+    """Code of a release that the standard does not have, as makers add them."""
+
+    Release = 0x9207
+
+
+def test_a_release_of_the_makers_own_is_a_line_in_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    release = (OfItsMaker.Release, (0, 0))
+    monkeypatch.setattr(standard_camera, "RELEASES", (release, *standard_camera.RELEASES))
+    habits = StandardHabits(release=OfItsMaker.Release)
+    _, picture, _, driver = bench(habits=habits)
+    assert_is_last(photograph(driver), picture)
+    _, picture, _, driver = bench()  # one without it
+    assert_is_last(photograph(driver), picture)
+    monkeypatch.undo()
+    with pytest.raises(DeviceError, match=r"without .* 0x100E: set its USB mode"):
+        bench(habits=habits)

@@ -1,1 +1,0 @@
-"""PTP over the network: PTP/IP (CIPA DC-005), on two TCP connections."""

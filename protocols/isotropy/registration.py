@@ -1,9 +1,0 @@
-"""Registration of the measurement `isotropy`."""
-
-from labrig.foundation.plugins import Measurement
-
-ISOTROPY = Measurement(
-    package=__package__,
-    protocol=".protocol:Isotropy",
-    result=".result:IsotropyResult",
-)
