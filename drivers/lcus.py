@@ -70,6 +70,7 @@ class LcusRelay(Switch):
 
     def switch(self, *, on: bool) -> None:
         """Send the command; see the class about reading back."""
+        self.state = None
         self.command(on=on)
         self.state = on
 

@@ -110,8 +110,12 @@ class MaestroServo(Servo):
         return quarters(position)
 
     def place(self) -> str:
-        """Return the Maestro's channel and its pulse."""
-        return f"channel {self.settings.channel}, pulse {self.pulse_s * 1e6:.2f} µs"
+        """Return the number of the Maestro's channel."""
+        return f"channel {self.settings.channel}"
+
+    def identity(self) -> str:
+        """Return the channel and the pulse that is sent."""
+        return f"{self.place()}, pulse {self.pulse_s * 1e6:.2f} µs"
 
     @property
     def pulse_s(self) -> float:
@@ -170,9 +174,9 @@ class MaestroServo(Servo):
     def _refused(self, pulse_s: float) -> UnclearAnswerError:
         sent_s = self.pulse_s
         return UnclearAnswerError(
-            f"channel {self.settings.channel} of {self.board.name} was set to send "
-            f"{pulse_s * 1e6:.2f} µs and sends {sent_s * 1e6:.2f} µs; in the Maestro Control "
-            "Center look whether it is a servo channel and its range (Min, Max) wide enough"
+            f"{self.name} was set to send {pulse_s * 1e6:.2f} µs and sends {sent_s * 1e6:.2f} µs; "
+            f"in {CONTROL_CENTER} look whether it is a servo channel and its range (Min, Max) wide "
+            "enough"
         )
 
     def make_safe(self, position: float) -> None:

@@ -81,14 +81,13 @@ class Dc4100Output(Switch):
         """Return the number of the output."""
         return settings.output
 
-    @property
-    def name(self) -> str:
-        """Number of the output and name of its unit."""
-        return f"output {self.settings.output} of {self.board.name}"
-
     def place(self) -> str:
+        """Return the number of the output."""
+        return f"output {self.settings.output}"
+
+    def identity(self) -> str:
         """Return the number of the output and its brightness."""
-        return f"output {self.settings.output} at {self._per_cent} %"
+        return f"{self.place()} at {self._per_cent} %"
 
     def head_nm(self) -> float | None:
         """Return the wavelength in nm that the head on the output names; None if it names none."""

@@ -41,6 +41,10 @@ class Channel(ABC):
     def place(self) -> str:
         """Return the channel's place on the board, such as `relay 3`; empty if it has no name."""
 
+    def identity(self) -> str:
+        """Return the place, and what else of the channel is worth recording."""
+        return self.place()
+
     @property
     def name(self) -> str:
         """Name of the channel in messages, such as `relay 3 of the Numato board at COM3`."""

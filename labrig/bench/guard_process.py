@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import BinaryIO
 
-from labrig.acquire import RigFile
+from labrig.acquire import RigFile, load_driver
 from labrig.bench.guard import (
     ALL_OFF,
     HANG_TIMEOUT_S,
@@ -27,7 +27,6 @@ from labrig.bench.guard import (
 )
 from labrig.bench.opening import Bench
 from labrig.bench.serial_ports import SerialPorts
-from labrig.foundation import plugins
 from labrig.foundation.clock import SystemClock
 from labrig.foundation.errors import LabrigError
 
@@ -97,7 +96,7 @@ class Lights:
         self._benches = []
         ports = SerialPorts()
         for key, entry in file.devices.items():
-            plugins.load(plugins.DRIVERS, entry.driver, source)  # imported now, not in an emergency
+            load_driver(key, entry.driver, source)  # imported now, not in an emergency
             for address in entry.addresses():
                 ports.look_up(address)
             single = file.model_copy(update={"devices": {key: entry}})

@@ -19,7 +19,7 @@ from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.region import Region
-from labrig.material import MAX_ORDER, Material, State, write_material
+from labrig.material import DECAY_LAWS, MAX_ORDER, Material, State, write_material
 from labrig.optics import CameraResponse
 from labrig.reproduce import (
     CARD_NAME,
@@ -38,7 +38,9 @@ NODES, WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 #: Name of the rendering of the run's own material, and of that of Becquerel's law.
 MEASURED, BECQUEREL = "measured", "Becquerel"
 #: Names of laws that have no states: only their courses over time are shown.
-STATELESS = {"otor": "one trap", "stretched": "stretched", RATE_SPECTRUM: "spectrum"}
+STATELESS = {law.name: law.short_label for law in DECAY_LAWS.values() if not law.has_states} | {
+    RATE_SPECTRUM: "spectrum"
+}
 #: Number of the scene's pictures of the glow, and paths that make smooth edges.
 PICTURES, SMOOTH = 8, 16
 

@@ -288,8 +288,6 @@ def _sigma_factor(x: FloatArray, light: FloatArray, sigma: FloatArray) -> float:
     return math.sqrt(ratio) if ratio > 1 + TOO_SMALL_SIGMAS * spread else 1.0
 
 
-#: Least and largest shape of a law of a rate and a shape.
-SHAPES = {"becquerel": (0.0, 2.0), "otor": (0.0, 1.0), "stretched": (0.1, 1.0)}
 #: Numbers of exponentials.
 N_EXPONENTIALS = (2, 3)
 #: Priors, mean and σ: ln of the amplitude above the first reading, ln of the rate times T, and the
@@ -334,13 +332,13 @@ class Candidate:
 
 def candidates(decay: LogDecay) -> tuple[Candidate, ...]:
     """Return the laws with priors for a record."""
-    becquerel, *others = (_law(name, decay) for name in SHAPES)
+    becquerel, *others = (_law(name, decay) for name in DECAY_LAWS)
     exponentials = (_exponentials(n, decay) for n in N_EXPONENTIALS)
     return (becquerel, *others, *exponentials, _with_exponential(becquerel, decay))
 
 
 def _law(name: str, decay: LogDecay) -> Candidate:
-    value, (least, largest) = DECAY_LAWS[name].value, SHAPES[name]
+    value, (least, largest) = DECAY_LAWS[name].value, DECAY_LAWS[name].forecast_shapes
 
     def log_light(theta: FloatArray, x: FloatArray) -> FloatArray:
         shape = least + (largest - least) * expit(theta[:, 2:])

@@ -17,6 +17,7 @@ and V. Pagonis, *Thermally and Optically Stimulated Luminescence* (2011), for on
 by G. Kitis and N. D. Vlachos, *Radiation Measurements* 48 (2013) 47.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -69,6 +70,18 @@ class DecayLaw:
         Least and largest shape.
     limits
         Shapes at which the law is a simpler one: an exponential, and the second order of one trap.
+    formula
+        Function of a rate in 1/s and a shape that returns the formula of the signal with numbers.
+    short_label
+        Name in the legend of a figure.
+    shape_name
+        Name of the shape among the law's own parameters.
+    possible_shapes
+        Least and largest shape that the law may have, whatever a fit's bounds.
+    forecast_shapes
+        Least and largest shape of decays that are continued beyond their record.
+    has_states
+        Whether the law is that of a state of general order, which a material file can hold.
     """
 
     name: str
@@ -77,6 +90,12 @@ class DecayLaw:
     means: Means
     shapes: tuple[float, float]
     limits: tuple[float, ...]
+    formula: Callable[[float, float], str]
+    short_label: str
+    shape_name: str = "exponent"
+    possible_shapes: tuple[float, float] = (0.0, 1.0)
+    forecast_shapes: tuple[float, float] = (0.0, 1.0)
+    has_states: bool = False
 
 
 def becquerel_value(phase: FloatArray, shape: FloatArray) -> FloatArray:
@@ -259,29 +278,54 @@ def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return psi, slope
 
 
-#: The laws by their names. Each contains an exponential.
+def _becquerel_formula(rate_per_s: float, shape: float) -> str:
+    tau_s = 1 / rate_per_s
+    if shape == 0:
+        return f"exp(−t/{tau_s:.3g} s)"
+    return f"(1 + t/{tau_s / shape:.3g} s)^−{1 / shape:.3g}"
+
+
+#: The laws by their names. Each contains an exponential. A further one is one more entry.
 DECAY_LAWS: Mapping[str, DecayLaw] = MappingProxyType(
     {
         law.name: law
         for law in (
             DecayLaw(
-                "becquerel",
-                "Becquerel's law",
-                becquerel_value,
-                becquerel_means,
-                (0.0, 10.0),
-                (0.0,),
+                name="becquerel",
+                label="Becquerel's law",
+                value=becquerel_value,
+                means=becquerel_means,
+                shapes=(0.0, 10.0),
+                limits=(0.0,),
+                formula=_becquerel_formula,
+                short_label="Becquerel",
+                possible_shapes=(0.0, math.inf),
+                forecast_shapes=(0.0, 2.0),
+                has_states=True,
             ),
             DecayLaw(
-                "otor", "one trap with retrapping", otor_value, otor_means, (0.0, 1.0), (0.0, 1.0)
+                name="otor",
+                label="one trap with retrapping",
+                value=otor_value,
+                means=otor_means,
+                shapes=(0.0, 1.0),
+                limits=(0.0, 1.0),
+                formula=lambda rate_per_s, shape: (
+                    f"1/k = {1 / rate_per_s:.3g} s at lamp off, retrapping {shape:.2g}"
+                ),
+                short_label="one trap",
+                shape_name="retrapping",
             ),
             DecayLaw(
-                "stretched",
-                "stretched exponential",
-                stretched_value,
-                stretched_means,
-                (0.1, 1.0),
-                (1.0,),
+                name="stretched",
+                label="stretched exponential",
+                value=stretched_value,
+                means=stretched_means,
+                shapes=(0.1, 1.0),
+                limits=(1.0,),
+                formula=lambda rate_per_s, shape: f"exp(−(t/{1 / rate_per_s:.3g} s)^{shape:.3g})",
+                short_label="stretched",
+                forecast_shapes=(0.1, 1.0),
             ),
         )
     }

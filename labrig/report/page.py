@@ -8,7 +8,13 @@ from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import (
+    ChoiceLoader,
+    Environment,
+    FileSystemLoader,
+    FunctionLoader,
+    StrictUndefined,
+)
 from markupsafe import Markup, escape
 
 from labrig.foundation.errors import DiskError
@@ -27,11 +33,16 @@ _FOLDER = Path(__file__).parent
 _SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
 
 
+def _by_path(name: str) -> str | None:
+    """Return the text of a measurement's own template, which has a path for its name."""
+    return read_text(Path(name)) if Path(name).is_absolute() else None
+
+
 @cache
 def environment() -> Environment:
     """Return the environment of the templates in this folder, with the functions that they use."""
     templates = Environment(
-        loader=FileSystemLoader(_FOLDER),
+        loader=ChoiceLoader([FileSystemLoader(_FOLDER), FunctionLoader(_by_path)]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

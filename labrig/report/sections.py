@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from labrig.acquire import RigFile
@@ -11,6 +12,11 @@ from labrig.report.chart import Chart
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def own_template(module: str, name: str) -> str:
+    """Return the path of a template `name.html.j2` beside a module, given by its `__file__`."""
+    return str(Path(module).resolve().with_name(f"{name}.html.j2"))
 
 
 @dataclass(frozen=True)

@@ -168,11 +168,10 @@ class FittedLaw:
             is_upper = self.shape == DECAY_LAWS[self.name].shapes[1]
             shape = OneSided.held(self.shape, float(shape_sigma), 0.0, is_upper=is_upper)
         time = Measured(1 / self.rate_per_s, float(rate_sigma) / self.rate_per_s**2, "s")
-        if self.name == "otor":
-            # A shape without σ is held at the exponential: no retrapping is told.
-            return {"decay_time_s": time} | ({"retrapping": shape} if shape_sigma else {})
-        if self.name == "stretched":
-            return {"decay_time_s": time, "exponent": shape}
+        law = DECAY_LAWS[self.name]
+        if not law.has_states:
+            # A shape without σ is held at the exponential: it is not determined.
+            return {"decay_time_s": time} | ({law.shape_name: shape} if shape_sigma else {})
         if self.shape == 0:
             # An exponential: p has no upper limit, b = 1/(1 − 1/p) has one.
             return {"decay_time_s": time, "kinetic_order": _held_at_first_order(shape)}
@@ -192,14 +191,7 @@ class FittedLaw:
     @property
     def formula(self) -> str:
         """Formula of the signal, 1 at lamp off, with its numbers."""
-        tau_s = 1 / self.rate_per_s
-        if self.name == "otor":
-            return f"1/k = {tau_s:.3g} s at lamp off, retrapping {self.shape:.2g}"
-        if self.name == "stretched":
-            return f"exp(−(t/{tau_s:.3g} s)^{self.shape:.3g})"
-        if self.shape == 0:
-            return f"exp(−t/{tau_s:.3g} s)"
-        return f"(1 + t/{tau_s / self.shape:.3g} s)^−{1 / self.shape:.3g}"
+        return DECAY_LAWS[self.name].formula(self.rate_per_s, self.shape)
 
     def signal(
         self, t_s: FloatArray, exposure_s: FloatArray, *, with_offset: bool = False

@@ -15,7 +15,7 @@ from labrig.protocols.colour_check.result import (
     ColourSummary,
 )
 from labrig.report.colours import css_colour, into_gamut
-from labrig.report.sections import Rendered, Section, Source, Table
+from labrig.report.sections import Rendered, Section, Source, Table, own_template
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def _section(result: ColourCheckResult) -> Section:
         "The ColorChecker",
         tuple(_text(result)),
         tables=(_table(result),),
-        template="colour_check.html.j2",
+        template=own_template(__file__, "colour_check"),
         content=tuple(_swatch(name, patch) for name, patch in result.patches.items()),
     )
 

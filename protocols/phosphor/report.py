@@ -17,7 +17,7 @@ from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.renderers import render_chain
 from labrig.report.report_model import GlowPhotograph
-from labrig.report.sections import Picture, Rendered, Section, Source
+from labrig.report.sections import Picture, Rendered, Section, Source, own_template
 from labrig.report.spectrum_figure import spectrum_figure
 from labrig.results import DecayPatch, ResultWithDecays
 
@@ -95,7 +95,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
             for name, material in result.materials.items()
         ),
         anchor="material",
-        template="phosphor.html.j2",
+        template=own_template(__file__, "phosphor"),
         content=_Overview(
             daylight,
             None if daylight else _first_glow(frames, result, screen),

@@ -9,7 +9,7 @@ from labrig.foundation.number_format import plus_minus, rounded
 from labrig.optics import XYZ_TO_SRGB
 from labrig.protocols.validate_illuminants.result import ValidateIlluminantsResult
 from labrig.report.colours import css_colour, into_gamut
-from labrig.report.sections import Rendered, Section, Source, Table
+from labrig.report.sections import Rendered, Section, Source, Table, own_template
 from labrig.results import LampComparison, LampPatch, Measured, SeenColour
 
 WHITES = {
@@ -135,7 +135,7 @@ def _lamp_sections(
         f"Under {lamp}",
         tuple(line for line in text if line),
         tables=(_values(comparison, result.channels), _colours(comparison)),
-        template="illuminants.html.j2",
+        template=own_template(__file__, "illuminants"),
         content=swatches,
     )
 

@@ -290,3 +290,53 @@ def test_two_lights_are_never_lit_and_after_any_interruption_all_go_off(
     driver.make_safe()
     assert not any(board.states)
     assert driver.channel_on() is None
+
+
+@given(waits=st.integers(1, 20), answers=st.sampled_from(ANSWERS))
+def test_a_light_whose_command_was_interrupted_goes_off_before_the_next_is_lit(
+    waits: int, answers: Answers
+) -> None:
+    clock = InterruptingClock()
+    board = LcusBoard(8, lambda relay, on: None, answers)
+    driver = eight("leds", Wired(clock, BoardPort(clock, board)))
+    with clock.interrupted_after(waits):
+        driver.light("365 nm")
+    driver.light("405 nm")
+    assert [number for number, on in enumerate(board.states, start=1) if on] == [2]
+
+
+class TwoBoards(Wired):
+    """Connections with a board at COM5 and one at COM6, if that is not missing."""
+
+    def __init__(self, clock: VirtualClock, **boards: LcusBoard) -> None:
+        self.clock = clock
+        self._ports = {name: BoardPort(clock, board) for name, board in boards.items()}
+
+    def serial(self, address: str, baudrate: int, framing: str = "8N1") -> ScriptedPort:
+        if address not in self._ports:
+            raise DeviceError(f"nothing is at {address}")
+        return self._ports[address]
+
+
+def test_lights_on_two_boards_are_one_bank_and_none_stays_lit_if_one_board_is_missing() -> None:
+    clock = VirtualClock()
+    boards = {port: LcusBoard(2, lambda relay, on: None, "bytes") for port in ("COM5", "COM6")}
+    channels: dict[str, Any] = {
+        "far": {"relay": 1, "address": "COM6"},
+        "a": 1,
+        "b": 2,
+        "beyond": {"relay": 2, "address": "COM6"},
+    }
+    bank = eight("leds", TwoBoards(clock, **boards), channels)
+    assert bank.channels() == ("far", "a", "b", "beyond")
+    for name, port, relay in (("far", "COM6", 0), ("b", "COM5", 1), ("beyond", "COM6", 1)):
+        bank.light(name)
+        assert bank.channel_on() == name
+        lit = [(at, n) for at, board in boards.items() for n in (0, 1) if board.states[n]]
+        assert lit == [(port, relay)]
+    bank.make_safe()
+    assert not any(state for board in boards.values() for state in board.states)
+    boards["COM5"].states[0] = True
+    with pytest.raises(DeviceError, match="nothing is at COM6"):
+        eight("leds", TwoBoards(clock, COM5=boards["COM5"]), channels)
+    assert not boards["COM5"].states[0]

@@ -80,7 +80,7 @@ class ServoSwing(BoardDevice):
 
     def identity(self) -> str:
         """Return the board's identity, the channel and the position that is commanded."""
-        return f"{self.board.identity()}, {self.noun} on {self._servo.place()}"
+        return f"{self.board.identity()}, {self.noun} on {self._servo.identity()}"
 
     def travel_s(self) -> float:
         """Return the time in seconds from the command until it has stopped, from the rig file."""

@@ -73,7 +73,7 @@ class SwitchedLamp(BoardDevice):
 
     def identity(self) -> str:
         """Return the board's identity, and the switch."""
-        return ", ".join(filter(None, (self.board.identity(), self._switch.place())))
+        return ", ".join(filter(None, (self.board.identity(), self._switch.identity())))
 
     def reads_back(self) -> bool:
         """Return whether the board reports the switch's state."""

@@ -5,6 +5,7 @@ seen as in daily life. Both are one kind of device under two keys of a rig file.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
@@ -130,11 +131,19 @@ class SwitchedLights(BoardDevice):
             [address, *(light.address or address for light in self._lights.values())]
         )
         self.board_class.check_addresses(settings, addresses)
-        self._boards = {port: self.board_class(port, settings, connections) for port in addresses}
-        self._switches: dict[str, Switch] = {
-            name: self.channel_class(self._boards[light.address or address], light)
-            for name, light in self._lights.items()
-        }
+        self._boards: dict[str, Board] = {}
+        self._switches: dict[str, Switch] = {}
+        try:
+            for port in addresses:
+                board = self._boards[port] = self.board_class(port, settings, connections)
+                for name, light in self._lights.items():
+                    if (light.address or address) == port:
+                        self._switches[name] = self.channel_class(board, light)
+        except BaseException:  # what a crash left lit on other boards is not to stay so
+            with suppress(DeviceError), connections.clock.shielded():
+                self.make_safe()
+            raise
+        self._switches = {name: self._switches[name] for name in self._lights}
         self._require_heads()
 
     @classmethod
@@ -178,7 +187,7 @@ class SwitchedLights(BoardDevice):
         return "; ".join(
             f"{board.identity()}, {self.noun} "
             + ", ".join(
-                f"{name} on {switch.place()}" if switch.place() else name
+                f"{name} on {switch.identity()}" if switch.place() else name
                 for name, switch in switches.items()
             )
             for board, switches in self._by_board()

@@ -105,7 +105,7 @@ class BoardPlaces(BoardDevice):
 
     def identity(self) -> str:
         """Return the board's identity and the device, with its channel if that has a name."""
-        place = self._channel.place()
+        place = self._channel.identity()
         return f"{self.board.identity()}, {self.noun}{f' on {place}' if place else ''}"
 
     def names(self) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ class BoardThermometer(BoardDevice):
 
     def identity(self) -> str:
         """Return the board's identity, and the channel."""
-        return f"{self.board.identity()}, {self._sensor.place()}"
+        return f"{self.board.identity()}, {self._sensor.identity()}"
 
     def celsius(self) -> float:
         """Return the temperature in degrees Celsius.

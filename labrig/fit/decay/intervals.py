@@ -28,9 +28,6 @@ from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
 from labrig.results import EXPONENTIALS, ProfileInterval
 
-#: Range of possible shapes of each law, whatever the fit's bounds, and the shape's name.
-SHAPES = {"becquerel": (0.0, math.inf), "otor": (0.0, 1.0), "stretched": (0.0, 1.0)}
-SHAPE_NAMES = {"becquerel": "exponent", "otor": "retrapping", "stretched": "exponent"}
 #: Change of the logarithm of a time within which its limits are sought.
 FARTHEST = 4.0
 #: Least shape of Becquerel's law with a logarithm.
@@ -162,9 +159,9 @@ def law_intervals(
     noise = _noise(float(law.covariance[1, 1] / student), float(own), dof)
     searched = log_rate - FARTHEST, log_rate + FARTHEST
     rate = Quantity(parameter(1), searched=searched)
-    quantity = Quantity(parameter(2), *SHAPES[kind.name], kind.shapes)
+    quantity = Quantity(parameter(2), *kind.possible_shapes, kind.shapes)
     time_s: Shown = {"decay_time_s": lambda log_rate: span_s * exponential(-log_rate)}
-    of_shape: Shown = {SHAPE_NAMES[kind.name]: float}
+    of_shape: Shown = {kind.shape_name: float}
     if kind.name == "becquerel":
         log_time, _ = _log_time(likelihood.fit.parameters)
         rate, time_s = (

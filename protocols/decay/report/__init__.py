@@ -39,7 +39,7 @@ from labrig.report.report_model import (
     GlowPhotograph,
     PatchReport,
 )
-from labrig.report.sections import Picture, Rendered, Section, Source
+from labrig.report.sections import Picture, Rendered, Section, Source, own_template
 from labrig.report.timing import (
     FrameTiming,
     LatenessStatistics,
@@ -324,7 +324,7 @@ def decay_sections(
                 f"Patch {patch.patch.name}",
                 figures=patch.figures,
                 anchor=patch.anchor,
-                template="patch.html.j2",
+                template=own_template(__file__, "patch"),
                 content=_Content(report, patches, screen.known, late, patch),
             )
             for patch in patches
@@ -334,7 +334,7 @@ def decay_sections(
     methods_section = Section(
         "Methods",
         anchor=f"{anchor}methods",
-        template="methods.html.j2",
+        template=own_template(__file__, "methods"),
         content={
             "methods": methods(report, sensor, late),
             "references": REFERENCES,
@@ -415,7 +415,7 @@ def _results(content: _Content, anchor: str) -> Section:
         "Results",
         figures=figures,
         anchor=f"{anchor}results",
-        template="results.html.j2",
+        template=own_template(__file__, "results"),
         content=content,
     )
 
@@ -432,7 +432,7 @@ def _sample(content: _Content, screen: Screen, anchor: str) -> Section:
     return Section(
         "Sample",
         anchor=f"{anchor}sample",
-        template="sample.html.j2",
+        template=own_template(__file__, "sample"),
         content=_Content(report, content.patches, screen.known, content.late, extra=extra),
     )
 
@@ -451,7 +451,7 @@ def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> t
             "Timing and stability",
             figures=figures,
             anchor=f"{anchor}timing",
-            template="timing.html.j2",
+            template=own_template(__file__, "timing"),
             content=_Content(
                 content.report,
                 content.patches,

@@ -6,6 +6,7 @@ import numpy as np
 
 from labrig.fit import Periodogram, periodogram
 from labrig.foundation.arrays import FloatArray
+from labrig.material import DECAY_LAWS
 from labrig.report.chart import (
     Axis,
     Band,
@@ -55,19 +56,16 @@ POINTS = 160
 SHOWN_SPANS, FIRST = 6.0, 1e-3
 #: Faintest and brightest end of the axis in that of the measured values.
 BELOW, ABOVE = 1e-2, 2.0
+_STYLES: tuple[LineStyle, ...] = (DASHED, DASH_DOTTED, DOTTED)
 _LINES: dict[str, tuple[str, LineStyle]] = {
     EXPONENTIALS: (OTHER_CHANNELS[0], SOLID),
-    "becquerel": (OTHER_CHANNELS[1], DASHED),
-    "otor": (OTHER_CHANNELS[2], DASH_DOTTED),
-    "stretched": (OTHER_CHANNELS[3], DOTTED),
+    **{
+        name: (OTHER_CHANNELS[1:][k % (len(OTHER_CHANNELS) - 1)], _STYLES[k % len(_STYLES)])
+        for k, name in enumerate(DECAY_LAWS)
+    },
     RATE_SPECTRUM: (MUTED, LONG_DASHED),
 }
-_SHORT = {
-    "otor": "one trap",
-    "becquerel": "Becquerel",
-    "stretched": "stretched",
-    RATE_SPECTRUM: "spectrum",
-}
+_SHORT = {law.name: law.short_label for law in DECAY_LAWS.values()} | {RATE_SPECTRUM: "spectrum"}
 
 
 def law_figure(series: Series, fit: FittedDecay) -> Chart:

@@ -23,7 +23,7 @@ from labrig.report.colours import Screen, css_colour, into_gamut, screen_for
 from labrig.report.figure_style import VARIABLES
 from labrig.report.reradiation import screen_linear
 from labrig.report.reradiation_figures import RETURNING, emission_spectra, spectra_chart
-from labrig.report.sections import Picture, Rendered, Section, Source, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table, own_template
 from labrig.results import ColourUnderLight, FluorescentPatch
 
 UV_SCALE = {
@@ -249,7 +249,7 @@ def _sample(
         tuple(_text(patch)),
         (*halves, *thirds),
         anchor=f"sample-{number}",
-        template="fluorescent_patch.html.j2",
+        template=own_template(__file__, "fluorescent_patch"),
         content=page,
     )
 
