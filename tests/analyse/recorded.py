@@ -127,8 +127,8 @@ def processed_once(run: Path) -> Processed:
             (place / "done").write_bytes(pickle.dumps(done))
             return done
     shutil.copytree(place / "result", run / "result")
-    done: Processed = pickle.loads((place / "done").read_bytes())
-    return replace(done, report=run / "result" / "report.html")
+    earlier: Processed = pickle.loads((place / "done").read_bytes())
+    return replace(earlier, report=run / "result" / "report.html")
 
 
 def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:
