@@ -180,10 +180,10 @@ class Gphoto2Camera:
         start_s = self._press(settings.exposure_s)
         end_s = start_s + settings.exposure_s
         self._frames.expect(end_s)
-        self._release.let_go_full(self._busy_s())
+        self._release.release_full(self._busy_s())
         self._clock.sleep_until(end_s)
         data, suffix = self._frames.fetch()
-        self._release.let_go(LATE_PRESS_S)
+        self._release.release(LATE_PRESS_S)
         return Frame(data, suffix, start_s, end_s, settings)
 
     def preview(self) -> bytes:
@@ -253,7 +253,7 @@ class Gphoto2Camera:
 
     def _disarm(self) -> None:
         self._armed = None
-        self._release.let_go(self._busy_s())
+        self._release.release(self._busy_s())
 
     def _viewfinder_off(self) -> None:
         if self._is_viewing and self._library.has(VIEWFINDER):

@@ -36,10 +36,10 @@ class Release(Protocol):
             Whether an exposure has begun is unknown.
         """
 
-    def let_go_full(self, busy_s: float) -> None:
+    def release_full(self, busy_s: float) -> None:
         """Release the second stage; a camera that still exposes may be busy for `busy_s`."""
 
-    def let_go(self, busy_s: float) -> None:
+    def release(self, busy_s: float) -> None:
         """Release both stages, half and full."""
 
 
@@ -68,15 +68,15 @@ class ButtonRelease:
             self._pending_releases.pop()
             raise
 
-    def let_go_full(self, busy_s: float) -> None:
+    def release_full(self, busy_s: float) -> None:
         if _LET_GO_FULL in self._pending_releases:
-            self._let_go_last(busy_s)
+            self._release_last(busy_s)
 
-    def let_go(self, busy_s: float) -> None:
+    def release(self, busy_s: float) -> None:
         while self._pending_releases:
-            self._let_go_last(busy_s)
+            self._release_last(busy_s)
 
-    def _let_go_last(self, busy_s: float) -> None:
+    def _release_last(self, busy_s: float) -> None:
         deadline_s = self._clock.now() + busy_s
         while True:
             try:
@@ -118,10 +118,10 @@ class TriggerRelease:
             return Span(called.begin_s, max(called.begin_s, called.end_s - exposure_s))
         return called
 
-    def let_go_full(self, busy_s: float) -> None:
+    def release_full(self, busy_s: float) -> None:
         pass
 
-    def let_go(self, busy_s: float) -> None:
+    def release(self, busy_s: float) -> None:
         pass
 
 

@@ -11,7 +11,7 @@ PIECE_BYTES = 1024 * 1024
 #: Longest file, several times the largest RAW file; a longer announcement is damaged.
 MAX_FILE_BYTES = 512 * 1024 * 1024
 #: A camera that still develops or writes is busy for seconds.
-PATIENT = Timeouts(answer_s=10.0, busy_s=10.0)
+LONG_TIMEOUTS = Timeouts(answer_s=10.0, busy_s=10.0)
 
 
 class ObjectTransfer:
@@ -70,4 +70,4 @@ class ObjectTransfer:
             request: tuple[IntEnum, *tuple[int, ...]] = (self._whole, handle)
         else:
             request = (self._part, handle, offset, size)
-        return self._session.transact(*request, timeouts=PATIENT, most_bytes=size).data
+        return self._session.transact(*request, timeouts=LONG_TIMEOUTS, most_bytes=size).data

@@ -77,9 +77,9 @@ class Timeouts:
 
 
 #: Time-outs of an operation that takes no time.
-USUAL = Timeouts(answer_s=5.0, busy_s=3.0)
+DEFAULT_TIMEOUTS = Timeouts(answer_s=5.0, busy_s=3.0)
 #: Time-outs of closing: nothing waits for it.
-CURT = Timeouts(answer_s=2.0, busy_s=0.0)
+SHORT_TIMEOUTS = Timeouts(answer_s=2.0, busy_s=0.0)
 
 
 @dataclass(frozen=True)
@@ -144,14 +144,14 @@ class Session:
         DeviceError
             The camera did not close it.
         """
-        self.transact(Standard.CloseSession, timeouts=CURT)
+        self.transact(Standard.CloseSession, timeouts=SHORT_TIMEOUTS)
 
     def transact(
         self,
         operation: IntEnum,
         *params: int,
         data: bytes | None = None,
-        timeouts: Timeouts = USUAL,
+        timeouts: Timeouts = DEFAULT_TIMEOUTS,
         most_bytes: int = MAX_ANSWER_BYTES,
     ) -> Reply:
         """Do one operation, repeated while the camera is busy.
@@ -205,7 +205,7 @@ class Session:
         The lower half of a store's number is 0 where its medium is missing (PIMA 15740, 5.2.1).
         """
         try:
-            stores = self.transact(Standard.GetStorageIDs, timeouts=CURT).data
+            stores = self.transact(Standard.GetStorageIDs, timeouts=SHORT_TIMEOUTS).data
         except DeviceError:
             return False
         numbers = struct.unpack(f"<{len(stores) // 4}I", stores[: len(stores) // 4 * 4])[1:]

@@ -56,7 +56,7 @@ class LightReadback:
         }
 
     @property
-    def is_told(self) -> bool:
+    def is_reported(self) -> bool:
         """Whether any light can be read back."""
         return bool(self._read_back)
 

@@ -356,7 +356,10 @@ class Session:
     def _sleep_until(self, deadline_s: float) -> None:
         """Wait, and keep devices awake and watchdogs served meanwhile."""
         needs_service = (
-            self._kept_awake or self._guarded or self._temperature.is_kept or self._lights.is_told
+            self._kept_awake
+            or self._guarded
+            or self._temperature.is_kept
+            or self._lights.is_reported
         )
         while needs_service and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_PERIOD_S:
             self.clock.sleep(AWAKE_PERIOD_S)

@@ -73,17 +73,17 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
         yield ("r(0): not determined without a weaker light; saturation in time is none in level")
     yield _rates_text(patch)
     if patch.order is not None:
-        yield _order_text(patch.order, is_told=patch.is_of_general_order)
+        yield _order_text(patch.order, is_reported=patch.is_of_general_order)
 
 
-def _order_text(test: OrderTest, *, is_told: bool) -> str:
+def _order_text(test: OrderTest, *, is_reported: bool) -> str:
     """Return the verdict on a kinetic order above 1, which other states may describe better."""
     shape, shift = (plus_minus(each.value, each.sigma) for each in (test.shape, test.shift))
     verdict = {
         "first order": "no sign of a kinetic order above 1: it does not depend on the charge",
         "general order": (
             f"as of a state of kinetic order {test.order}"
-            if is_told
+            if is_reported
             else "it depends on the charge as that of states of first order, filled unequally"
         ),
         "neither": "it depends on the charge, but not as that of a state of one kinetic order",

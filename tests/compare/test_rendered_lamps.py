@@ -29,7 +29,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Samples under a lamp that is not quite its file, a narrow one, and one that is not seen."""
 
     def with_blue(rig: dict[str, Any]) -> None:
-        lamps = rig["devices"]["illuminants"]["lamps"]
+        lamps = rig["devices"]["illuminants"]["channels"]
         of_black_light = rig["simulation"]["illuminants"][3]
         lamps["blue"] = lamps["ultraviolet"] | {"relay": 1, "centre": 450, "fwhm": 20}
         rig["simulation"]["illuminants"][1] = of_black_light | {

@@ -121,15 +121,15 @@ def test_noise_that_takes_light_away_is_told() -> None:
     """A mixture of the same matrix has none."""
     matrix = DYE.to_matrix(INPUT_NM, OUTPUT_NM, reflectance=np.full(len(OUTPUT_NM), 0.4))
     assert of_matrix(matrix, Bands.even()).notes == ()
-    for noise, is_told in ((1e-5, False), (5e-4, True)):
+    for noise, is_reported in ((1e-5, False), (5e-4, True)):
         rng = np.random.default_rng(3)
         noisy = replace(
             matrix, reradiation=matrix.reradiation + rng.normal(0, noise, matrix.reradiation.shape)
         )
         surface = of_matrix(noisy, Bands.even())
         lowest = (surface.matrix - 0.4 * np.eye(24)).min()
-        assert len(surface.notes) == is_told
-        if is_told:
+        assert len(surface.notes) == is_reported
+        if is_reported:
             assert f"{-lowest:.1%}" in surface.notes[0]
     with pytest.raises(UsageError, match="≥ 0"):
         of_matrix(replace(matrix, reradiation=matrix.reradiation - 0.003), Bands.even())

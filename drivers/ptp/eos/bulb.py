@@ -52,7 +52,7 @@ class EosBulb:
             raise
         hidden = reply.params[0] & 0xFFFF if reply.params else 0
         if hidden & _HIDDEN_MASK == _HIDDEN and hidden != OK:
-            self._release.doubt()
+            self._release.mark_unknown()
             raise _refused(hidden)
         return reply
 
@@ -65,7 +65,7 @@ class EosBulb:
             The shutter may still be open.
         """
         try:
-            return self._release.let_go(CLOSING_S)
+            return self._release.release(CLOSING_S)
         except RefusedError as refusal:
             if refusal.code != _GENERAL_ERROR:
                 raise
@@ -84,7 +84,7 @@ class EosBulb:
         DeviceError
             The shutter may still be open.
         """
-        self._release.let_go_blindly()
+        self._release.force_release()
 
 
 def bulb_of(info: DeviceInfo, session: Session, release: Release) -> EosBulb | None:

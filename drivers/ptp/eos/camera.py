@@ -9,7 +9,7 @@ from labrig.foundation.clock import Clock
 
 from ..device_info import DeviceInfo
 from ..failures import RefusedError
-from ..session import CURT, Session
+from ..session import SHORT_TIMEOUTS, Session
 from ..settings import PtpCameraSettings
 from .checks import findings
 from .exposure import EosExposure
@@ -95,7 +95,7 @@ class EosCamera:
             The camera did not take one of the settings.
         """
         self.take_control()
-        self._shutter.let_go_blindly()
+        self._shutter.force_release()
         self._frames.expect_left_over()
 
     def give_back(self) -> None:
@@ -108,7 +108,7 @@ class EosCamera:
         """
         for step in (Eos.SetEventMode, Eos.SetRemoteMode):
             with suppress(RefusedError):
-                self._session.transact(step, 0, timeouts=CURT)
+                self._session.transact(step, 0, timeouts=SHORT_TIMEOUTS)
 
     def offers(self) -> CameraOffers:
         """Return the exposure settings that the camera offers now.
@@ -160,7 +160,7 @@ class EosCamera:
             The camera does not offer the settings or did not take them.
         """
         self._armed = False
-        self._shutter.let_go()
+        self._shutter.release()
         self._frames.discard_abandoned()
         self._exposure.apply(settings)
         return self._exposure.in_force()
@@ -201,7 +201,7 @@ class EosCamera:
         else:
             start_s, end_s = self._shutter.expose(settings.exposure_s)
         data, suffix = self._frames.fetch()
-        self._shutter.let_go()
+        self._shutter.release()
         return Frame(data, suffix, start_s, end_s, settings)
 
     def preview(self) -> bytes:
@@ -223,7 +223,7 @@ class EosCamera:
         self._armed = False
         return (
             self._shutter.close,
-            self._shutter.let_go,
+            self._shutter.release,
             self._frames.discard_offered,
             self._viewfinder.off_whoever_switched_it_on,
         )

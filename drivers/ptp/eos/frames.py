@@ -9,8 +9,8 @@ from labrig.foundation.errors import DeviceError
 from ..codes import INVALID_OBJECT_HANDLE, Standard
 from ..device_info import DeviceInfo
 from ..failures import RefusedError
-from ..object_transfer import PATIENT, ObjectTransfer
-from ..session import USUAL, Session
+from ..object_transfer import LONG_TIMEOUTS, ObjectTransfer
+from ..session import DEFAULT_TIMEOUTS, Session
 from .events import ObjectOffered
 from .protocol import Eos
 from .state import POLL_PERIOD_S, EosState
@@ -51,7 +51,7 @@ class EosTransfer:
             The camera did not take the confirmation.
         """
         try:
-            self._session.transact(Eos.TransferComplete, offered.handle, timeouts=PATIENT)
+            self._session.transact(Eos.TransferComplete, offered.handle, timeouts=LONG_TIMEOUTS)
         except RefusedError as refusal:
             # it has forgotten it: it heard an earlier attempt, whose answer was lost
             if refusal.code != INVALID_OBJECT_HANDLE:
@@ -143,7 +143,7 @@ class EosFrames:
         DeviceError
             The camera does not answer.
         """
-        self._state.refresh(USUAL.busy_s + self.exposing_for_s())
+        self._state.refresh(DEFAULT_TIMEOUTS.busy_s + self.exposing_for_s())
         for offered in self._state.offered:
             try:
                 self._settle(offered)

@@ -41,14 +41,14 @@ class StageCommands:
     ----------
     session
         Session with the camera.
-    press, let_go
+    press, release
         Operations that press and release the stage.
     """
 
-    def __init__(self, session: Session, press: Command, let_go: Command) -> None:
+    def __init__(self, session: Session, press: Command, release: Command) -> None:
         self._session = session
         self._press = press
-        self._let_go = let_go
+        self._release_command = release
         self._stage = Stage.UP
 
     @property
@@ -69,7 +69,7 @@ class StageCommands:
         self._stage = Stage.DOWN
         return reply
 
-    def let_go(self, busy_s: float) -> Reply | None:
+    def release(self, busy_s: float) -> Reply | None:
         """Release the stage unless it is surely up; a camera that exposes may be busy for `busy_s`.
 
         Returns
@@ -88,7 +88,9 @@ class StageCommands:
         self._stage = Stage.UNKNOWN
         reply = None
         try:
-            reply = self._session.transact(*self._let_go, timeouts=Timeouts(FOCUS_S, busy_s))
+            reply = self._session.transact(
+                *self._release_command, timeouts=Timeouts(FOCUS_S, busy_s)
+            )
         except RefusedError as refusal:
             if refusal.code == DEVICE_BUSY:
                 self._stage = previous
@@ -99,11 +101,11 @@ class StageCommands:
         self._stage = Stage.UP
         return reply
 
-    def doubt(self) -> None:
+    def mark_unknown(self) -> None:
         """Note that a pressed stage may not be down."""
         self._stage = Stage.UNKNOWN
 
-    def let_go_blindly(self) -> None:
+    def force_release(self) -> None:
         """Release a stage that another program, or this one before a reset, may hold.
 
         Raises
@@ -111,8 +113,8 @@ class StageCommands:
         DeviceError
             The stage may still be down.
         """
-        self.doubt()
-        self.let_go(LATE_PRESS_S)
+        self.mark_unknown()
+        self.release(LATE_PRESS_S)
 
 
 class Release(ABC):
@@ -135,15 +137,15 @@ class Release(ABC):
         """
 
     @abstractmethod
-    def let_go_full(self, busy_s: float) -> None:
+    def release_full(self, busy_s: float) -> None:
         """Release the second stage; a camera that still exposes may be busy for `busy_s`."""
 
     @abstractmethod
-    def let_go_half(self, busy_s: float) -> None:
+    def release_half(self, busy_s: float) -> None:
         """Release the first stage."""
 
     @abstractmethod
-    def let_go_blindly(self) -> None:
+    def force_release(self) -> None:
         """Release a button that another program, or this one before a reset, may have held."""
 
 
@@ -164,15 +166,15 @@ class TwoStageRelease(Release):
         # some cameras answer when the shutter has closed
         return self.full.press(Timeouts(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S))
 
-    def let_go_full(self, busy_s: float) -> None:
-        self.full.let_go(busy_s)
+    def release_full(self, busy_s: float) -> None:
+        self.full.release(busy_s)
 
-    def let_go_half(self, busy_s: float) -> None:
-        self._half.let_go(busy_s)
+    def release_half(self, busy_s: float) -> None:
+        self._half.release(busy_s)
 
-    def let_go_blindly(self) -> None:
-        self.full.let_go_blindly()
-        self._half.let_go_blindly()
+    def force_release(self) -> None:
+        self.full.force_release()
+        self._half.force_release()
 
 
 class OneStageRelease(Release):
@@ -197,13 +199,13 @@ class OneStageRelease(Release):
             )
         return reply
 
-    def let_go_full(self, busy_s: float) -> None:
+    def release_full(self, busy_s: float) -> None:
         pass
 
-    def let_go_half(self, busy_s: float) -> None:
+    def release_half(self, busy_s: float) -> None:
         pass
 
-    def let_go_blindly(self) -> None:
+    def force_release(self) -> None:
         pass
 
 

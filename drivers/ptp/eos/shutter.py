@@ -75,7 +75,7 @@ class EosShutter:
         start_s = _middle_s(reply) + self._lag_s
         end_s = start_s + exposure_s
         self._frames.expect(end_s)
-        self._release.let_go_full(self._busy_s())
+        self._release.release_full(self._busy_s())
         self._clock.sleep_until(end_s)
         return start_s, end_s
 
@@ -123,9 +123,9 @@ class EosShutter:
                 self._frames.expect(self._clock.now())
             else:
                 self._frames.expect_none()
-        self._release.let_go_full(self._busy_s())
+        self._release.release_full(self._busy_s())
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Release the first stage.
 
         Raises
@@ -133,9 +133,9 @@ class EosShutter:
         DeviceError
             The camera did not confirm it.
         """
-        self._release.let_go_half(self._busy_s())
+        self._release.release_half(self._busy_s())
 
-    def let_go_blindly(self) -> None:
+    def force_release(self) -> None:
         """Release a button that another program, or this one before a reset, may have held.
 
         Raises
@@ -145,7 +145,7 @@ class EosShutter:
         """
         if self._bulb is not None:
             self._bulb.close_blindly()
-        self._release.let_go_blindly()
+        self._release.force_release()
 
     def _busy_s(self) -> float:
         """Return how long the camera may be busy: to the end of an exposure, and a little more."""

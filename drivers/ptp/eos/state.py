@@ -7,7 +7,7 @@ from labrig.foundation.clock import Clock
 from labrig.foundation.errors import DeviceError
 
 from ..failures import RefusedError
-from ..session import USUAL, Session, Timeouts
+from ..session import DEFAULT_TIMEOUTS, Session, Timeouts
 from .custom_functions import CustomFunctions
 from .events import ChoicesChanged, Event, ObjectOffered, ValueChanged, parse_events
 from .protocol import Eos, Property, property_dataset, value_text
@@ -65,7 +65,7 @@ class EosState:
         """Return the codes that a property can be set to, as the camera lists them."""
         return self._choices.get(prop, ())
 
-    def refresh(self, busy_s: float = USUAL.busy_s) -> None:
+    def refresh(self, busy_s: float = DEFAULT_TIMEOUTS.busy_s) -> None:
         """Take in all events that wait in the camera, which may be busy for `busy_s` seconds.
 
         Raises
@@ -81,7 +81,7 @@ class EosState:
             "in a row: switch it off and on"
         )
 
-    def listen(self, busy_s: float = USUAL.busy_s) -> bool:
+    def listen(self, busy_s: float = DEFAULT_TIMEOUTS.busy_s) -> bool:
         """Ask once for events; return whether there were any. The camera may be busy for `busy_s`.
 
         Raises
@@ -89,7 +89,7 @@ class EosState:
         DeviceError
             The camera does not answer, or violates the protocol.
         """
-        events = self._events(Timeouts(USUAL.answer_s, busy_s))
+        events = self._events(Timeouts(DEFAULT_TIMEOUTS.answer_s, busy_s))
         for event in events:
             match event:
                 case ValueChanged(prop, value) if prop in _KNOWN:

@@ -13,7 +13,7 @@ from labrig.foundation.errors import DeviceError
 from ..codes import DEVICE_BUSY
 from ..device_info import DeviceInfo
 from ..failures import MalformedError, RefusedError
-from ..session import CURT, Session
+from ..session import SHORT_TIMEOUTS, Session
 from .protocol import VIEWFINDER_OFF, VIEWFINDER_TO_PC, Eos, Property, number
 from .state import EosState
 
@@ -66,7 +66,7 @@ class EosViewfinder:
         while True:
             try:
                 data = self._session.transact(
-                    Eos.GetViewFinderData, WHOLE_PICTURE, timeouts=CURT
+                    Eos.GetViewFinderData, WHOLE_PICTURE, timeouts=SHORT_TIMEOUTS
                 ).data
             except RefusedError as refusal:
                 if refusal.code not in (NOT_READY, DEVICE_BUSY):

@@ -8,7 +8,7 @@ from labrig.foundation.errors import DeviceError
 from ..codes import INVALID_OBJECT_HANDLE, Standard, StandardEvent
 from ..device_info import DeviceInfo
 from ..failures import RefusedError
-from ..object_transfer import PATIENT, ObjectTransfer
+from ..object_transfer import LONG_TIMEOUTS, ObjectTransfer
 from ..session import Session
 from .object_info import FOLDER, ObjectInfo, parse_object_info
 
@@ -166,7 +166,7 @@ class StandardFrames:
 
     def _inspect(self, handle: int) -> None:
         try:
-            reply = self._session.transact(Standard.GetObjectInfo, handle, timeouts=PATIENT)
+            reply = self._session.transact(Standard.GetObjectInfo, handle, timeouts=LONG_TIMEOUTS)
         except RefusedError as refusal:
             if refusal.code != INVALID_OBJECT_HANDLE:
                 raise
@@ -192,7 +192,7 @@ class StandardFrames:
         if not self._can_delete:
             return
         try:
-            self._session.transact(Standard.DeleteObject, stored.handle, 0, timeouts=PATIENT)
+            self._session.transact(Standard.DeleteObject, stored.handle, 0, timeouts=LONG_TIMEOUTS)
         except RefusedError:
             return  # a card that fills up ends a run later, and says so; no reason to end it now
 

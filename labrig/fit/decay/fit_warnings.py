@@ -397,7 +397,7 @@ def warnings_about(
     if not free_offset:
         warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
-    if correlation is not None and correlation.is_told and not is_rounding:
+    if correlation is not None and correlation.is_reported and not is_rounding:
         warnings.append(
             f"the noise of neighbouring values correlates (by {correlation.correlation:.1f}): σ "
             f"allows for it, it is up to {correlation.factor:.2g} times as large as for "

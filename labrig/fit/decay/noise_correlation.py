@@ -238,7 +238,7 @@ class NoiseCorrelation:
     probabilities: dict[str, FloatArray]
 
     @property
-    def is_told(self) -> bool:
+    def is_reported(self) -> bool:
         """Whether the data tell it clearly."""
         return self.evidence > TOLD
 
@@ -336,7 +336,7 @@ def noise_correlation(
         noise=noise,
         probabilities=correlated,
     )
-    if not found.is_told:
+    if not found.is_reported:
         return found
     independent = np.diag(solution.covariance)[rates]
     added = np.diag(found.added_covariance(data, joint, signal))[rates]

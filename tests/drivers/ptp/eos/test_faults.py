@@ -67,15 +67,17 @@ def test_busy_for_ever_at(step: Key) -> None:
     assert_usable(b, camera)
 
 
-@pytest.mark.parametrize(("cards", "is_told"), [([], True), ([0x10000], True), ([0x10001], False)])
-def test_busy_for_want_of_a_card(cards: list[int], is_told: bool) -> None:
+@pytest.mark.parametrize(
+    ("cards", "is_reported"), [([], True), ([0x10000], True), ([0x10001], False)]
+)
+def test_busy_for_want_of_a_card(cards: list[int], is_reported: bool) -> None:
     b = bench()
     camera = b.connect()
     b.toy.cards = cards
     b.toy.faults[STEPS["full press"]] = [Fault.BUSY] * 1000
     with pytest.raises(DeviceError) as error:
         photograph(camera)
-    assert ("no card" in str(error.value)) == is_told
+    assert ("no card" in str(error.value)) == is_reported
 
 
 @pytest.mark.parametrize("step", STEPS.values(), ids=STEPS.keys())
