@@ -218,7 +218,7 @@ def undrawn(pytestconfig: pytest.Config) -> Iterator[None]:
         drawn = draw if is_drawn() or is_made else partial(_draw_blank, draw)
         return drawn(sections, figure_files)
 
-    def save_if_asked(figure: Figure, file: object, *arguments: Any, **keys: Any) -> None:
+    def save_if_asked(figure: Figure, file: Any, *arguments: Any, **keys: Any) -> None:
         (save if is_drawn() else _leave_blank)(figure, file, *arguments, **keys)
 
     with pytest.MonkeyPatch.context() as patched:

@@ -14,7 +14,6 @@ from labrig.foundation.errors import UsageError
 NUMBA_CONFIGURATION = ".numba_config.yaml"
 
 
-@cache
 def compiled(name: str) -> Any:
     """Return a module of this package; functions are compiled, or read from the cache, when used.
 
@@ -37,6 +36,7 @@ def compiled(name: str) -> Any:
         ) from None
 
 
+@cache
 def _set_cache_folder() -> None:
     if "numba" not in sys.modules and Path(NUMBA_CONFIGURATION).exists():
         raise UsageError(

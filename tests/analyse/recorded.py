@@ -79,7 +79,8 @@ def recorded(
         if not (place / "runs").is_dir():
             shutil.copytree(folder, place, dirs_exist_ok=True)
             try:
-                _recorded(place, *_moved((protocol, rig), str(folder), str(place)), watch)
+                moved = [_moved(each, str(folder), str(place)) for each in (protocol, rig)]
+                _recorded(place, moved[0], moved[1], watch)
             except BaseException:
                 # What a run that failed has left belongs to its test alone.
                 shutil.copytree(place, folder, dirs_exist_ok=True)
@@ -126,8 +127,8 @@ def processed_once(run: Path) -> Processed:
             (place / "done").write_bytes(pickle.dumps(done))
             return done
     shutil.copytree(place / "result", run / "result")
-    done = pickle.loads((place / "done").read_bytes())
-    return replace(done, report=run / "result" / "report.html")
+    earlier: Processed = pickle.loads((place / "done").read_bytes())
+    return replace(earlier, report=run / "result" / "report.html")
 
 
 def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:

@@ -8,7 +8,6 @@ import pytest
 from labrig.foundation.errors import UsageError
 from labrig.material import ReradiationMatrix, read_material
 from labrig.reproduce import Field, FieldParameters, WavelengthShift
-from labrig.reproduce.compiled import compiled
 
 
 @pytest.fixture
@@ -16,7 +15,6 @@ def without_numba(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "numba", None)
     for name in ("surface.field_kernels", "transport.shift_kernels"):
         monkeypatch.delitem(sys.modules, f"labrig.reproduce.{name}", raising=False)
-    compiled.cache_clear()
 
 
 @pytest.mark.usefixtures("without_numba")

@@ -42,7 +42,7 @@ FORMS: dict[str, Callable[[datetime], str]] = {
 }
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     form=st.sampled_from(list(FORMS)),
     start=st.datetimes(datetime(2000, 1, 1), datetime(2060, 1, 1)),
