@@ -224,6 +224,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
         *unknown_camera,
         *temperature_warnings(run, protocol.rate_frames),
         *_clock_step_warnings(run),
+        *_unfinished_warnings(run, protocol),
     )
     result = replace(result, warnings=warnings)
 
@@ -307,6 +308,17 @@ def _render(result: RunResult, source: Source) -> Rendered:
     )
     more = tuple(replace(section, part=part) for section in about_run)
     return replace(rendered, sections=(*rendered.sections, *more))
+
+
+def _unfinished_warnings(run: RunRecord, protocol: ProtocolModel) -> tuple[str, ...]:
+    """Return a warning of the units that an unfinished run lacks."""
+    units = [unit.name for unit in protocol.units()]
+    if not (missing := [name for name in units if name not in run.completed()]):
+        return ()
+    return (
+        f"the run is not finished: {len(missing)} of {len(units)} units are missing, from "
+        f"{missing[0]} on; go on with: labrig resume {run.name}",
+    )
 
 
 def _clock_step_warnings(run: RunRecord) -> tuple[str, ...]:

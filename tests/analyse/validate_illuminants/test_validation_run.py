@@ -122,7 +122,7 @@ def test_lamps_in_another_order_count_as_those_that_were_lit(run: Path) -> None:
     entry = part.rig.devices["illuminants"]
     lamps = entry.settings()["channels"]
     swapped = lamps | {"daylight": lamps["halogen"], "halogen": lamps["daylight"]}
-    devices = part.rig.devices | {"illuminants": entry.model_copy(update={"lamps": swapped})}
+    devices = part.rig.devices | {"illuminants": entry.model_copy(update={"channels": swapped})}
     rig = part.rig.model_copy(update={"devices": devices})
     result = analyse(replace(part, rig=rig))
     assert list(result.lamps) == ["halogen", "daylight", "xenon", "ultraviolet"]
