@@ -33,7 +33,6 @@ from labrig.reproduce import (
     read_spectral_exr,
     tristimulus,
 )
-from labrig.reproduce.compiled import compiled
 from tests.conftest import Ended
 
 SMALL = ("--size", "12x9", "--paths", "4")
@@ -279,7 +278,6 @@ def test_without_the_extra_it_is_one_line(
         if name.split(".")[0] == missing or name.endswith("kernels"):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, missing, None)
-    compiled.cache_clear()
     around = [(0, 0), (5, 0), (5, 4), (4, 4), (4, 1), (1, 1), (1, 4), (0, 4)]
     Path("a.obj").write_text(
         "".join(f"v {x} {y} 0\n" for x, y in around) + "f 1 2 3 4 5 6 7 8\n", encoding="utf-8"

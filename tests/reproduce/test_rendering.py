@@ -20,7 +20,6 @@ from labrig.reproduce import (
     load_scene,
     read_mesh,
 )
-from labrig.reproduce.compiled import compiled
 from tests.reproduce.small_scenes import LUX, kappa_of, scene
 
 PAINT = {"file": "blue-paint", "assume_albedo": 0.6}
@@ -303,7 +302,6 @@ def test_without_the_extra_it_says_what_to_install(
         if name.split(".")[0] == missing or name.endswith("kernels"):
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, missing, None)
-    compiled.cache_clear()
     with pytest.raises(UsageError, match=r"pip install 'labrig\[render\]'"):
         Renderer(scene(tmp_path)).frame(0.0)
 
