@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from seabreeze.pyseabreeze.devices import SeaBreezeDevice
 
 #: Longest integration: one that runs cannot be interrupted.
-LONGEST_S = 10.0
+MAX_S = 10.0
 #: Part of the converter's range from which a pixel counts as saturated.
 SATURATED = 0.99
 #: Errors of a device that is gone, on Linux, macOS and Windows.
@@ -188,7 +188,7 @@ class SeabreezeSpectrometer:
                 f"{self._name} has wavelengths that do not rise; its EEPROM is damaged: let its "
                 "maker restore it"
             )
-        self._limits_s = low_us * 1e-6, min(high_us * 1e-6, LONGEST_S)
+        self._limits_s = low_us * 1e-6, min(high_us * 1e-6, MAX_S)
         assert isinstance(device, SeaBreezeDevice)
         self._device = device
 

@@ -21,7 +21,7 @@ from .serial_line import SerialLine
 BAUDRATE = 115_200
 PROMPT = b"> "
 MODELS = ("FW102C", "FW212C")
-MOST_SLOTS = 12
+MAX_SLOTS = 12
 #: Pause between two readings of the position.
 LOOK_AGAIN_S = 0.1
 
@@ -40,7 +40,7 @@ class Fw102cSlots(Positions):
 
         travel: Annotated[DurationS, Field(gt=0, le=60)] = 10.0
 
-    Position = Annotated[int, Field(ge=1, le=MOST_SLOTS)]
+    Position = Annotated[int, Field(ge=1, le=MAX_SLOTS)]
     empty = 1
     noun = "slot"
     board: "ThorlabsFw102c"

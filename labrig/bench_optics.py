@@ -41,7 +41,7 @@ SKEW_SHARE = 0.14
 
 
 @dataclass(frozen=True, eq=False)
-class LedExposure:
+class LightSource:
     """An LED, or another lamp, as a light for a fit.
 
     Attributes
@@ -241,9 +241,9 @@ def filter_transmittances(rig: RigFile, names: Sequence[str]) -> list[Transmitta
     return [read_transmittance(files[name]) for name in names]
 
 
-def led_exposures(
+def led_sources(
     rig: RigFile, source: str, calibration: LedsFile | None = None
-) -> dict[str, LedExposure]:
+) -> dict[str, LightSource]:
     """Return spectrum and brightness of each LED of a rig: as calibrated, else by the rig file.
 
     An LED that the calibration left out has the rig file's spectrum, through the polariser if there
@@ -276,7 +276,7 @@ def led_exposures(
         led = calibrated.get(name)
         if led is not None:
             known = led.brightness is not None and led.brightness_sigma is not None
-            exposures[name] = LedExposure(
+            exposures[name] = LightSource(
                 led.spectrum(name),
                 led.brightness if led.brightness is not None and known else 1.0,
                 led.brightness_sigma if led.brightness_sigma is not None and known else math.inf,
@@ -293,13 +293,13 @@ def led_exposures(
             passed = spectrum.value * polariser.at(spectrum.wavelength_nm)
             spectrum = replace(spectrum, value=passed, sigma=None)
         sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * (light.fwhm or 0.0))
-        exposures[name] = LedExposure(
+        exposures[name] = LightSource(
             replace(spectrum, name=name), 1.0, math.inf, sigma_nm, light.spectrum is None
         )
     return exposures
 
 
-def illuminant_exposures(rig: RigFile, source: str) -> dict[str, LedExposure]:
+def illuminant_sources(rig: RigFile, source: str) -> dict[str, LightSource]:
     """Return the light of each lamp of a rig's bank behind its filter, of unknown brightness.
 
     Parameters
@@ -328,7 +328,7 @@ def illuminant_exposures(rig: RigFile, source: str) -> dict[str, LedExposure]:
             (passed,) = filter_transmittances(rig, [lamp.filter])
             spectrum = replace(spectrum, value=spectrum.value * passed.at(spectrum.wavelength_nm))
         sigma_nm = math.hypot(DATA_SHEET_NM, SKEW_SHARE * lamp.fwhm) if lamp.fwhm else 0.0
-        exposures[name] = LedExposure(
+        exposures[name] = LightSource(
             replace(spectrum, name=name),
             1.0,
             math.inf,

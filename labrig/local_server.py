@@ -59,7 +59,7 @@ class LocalServer(ThreadingHTTPServer):
     # A connection that finds the queue full is tried again by the system after a second.
     request_queue_size = MAX_CONNECTIONS
 
-    def __init__(self, port: int, conversation: type["LocalConversation"]) -> None:
+    def __init__(self, port: int, conversation: type["RequestHandler"]) -> None:
         self.token = secrets.token_urlsafe(18)
         self._free = threading.BoundedSemaphore(MAX_CONNECTIONS)
         try:
@@ -102,7 +102,7 @@ class LocalServer(ThreadingHTTPServer):
             thread.join()
 
 
-class LocalConversation(BaseHTTPRequestHandler):
+class RequestHandler(BaseHTTPRequestHandler):
     """Connection of a browser."""
 
     server: LocalServer
@@ -134,7 +134,7 @@ class LocalConversation(BaseHTTPRequestHandler):
         except ConnectionError:
             raise
         except Exception as error:
-            self._confess(error)
+            self._send_internal_error(error)
 
     def accept(self, path: str, body: bytes) -> None:
         """Handle a POST."""
@@ -155,9 +155,9 @@ class LocalConversation(BaseHTTPRequestHandler):
         except ConnectionError:
             raise
         except Exception as error:
-            self._confess(error)
+            self._send_internal_error(error)
 
-    def _confess(self, error: Exception) -> None:
+    def _send_internal_error(self, error: Exception) -> None:
         """Say that labrig is at fault: without an answer a page would take it for gone."""
         if isinstance(error, MemoryError):
             self.refuse(HTTPStatus.INSUFFICIENT_STORAGE, str(memory_shortage(error)))

@@ -34,7 +34,7 @@ APERTURES: Final[tuple[Fraction, ...]] = tuple(
     )
 )
 #: log2 of the dial's longest exposure: "30" is 32 s.
-LONGEST_LOG2 = 5
+MAX_LOG2 = 5
 
 #: XYZ (D65) to camera, row by row, as Adobe gives it for the EOS 5D Mark II; times 10000.
 COLOR_MATRIX = (4716, 603, -830, -7798, 15474, 2480, -1496, 1937, 6651)
@@ -67,7 +67,7 @@ def exposure_label(exposure_s: float) -> Fraction:
 
     Bulb exposures beyond the dial are written in whole seconds.
     """
-    true_s = [2.0 ** (LONGEST_LOG2 - step / 3) for step in range(len(DIAL))]
+    true_s = [2.0 ** (MAX_LOG2 - step / 3) for step in range(len(DIAL))]
     if exposure_s > true_s[0] * 2 ** (1 / 6):
         return Fraction(round(exposure_s))
     nearest = min(range(len(DIAL)), key=lambda step: abs(exposure_s / true_s[step] - 1))

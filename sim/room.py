@@ -51,7 +51,7 @@ from .sensor import (
 from .simulation import Simulation
 from .truth import Truth, true_lvf, true_patches
 from .view import Table
-from .wander import Ripple, Wander
+from .wander import OrnsteinUhlenbeckNoise, Ripple
 
 #: Rounding of times that were added up differently.
 TICK_S = 1e-6
@@ -409,7 +409,7 @@ class Room:
 
     def _flicker_course(self) -> Course | None:
         over_s = self._simulation.sensor.flicker_over
-        return None if over_s is None else Wander(self._rng(FLICKER_STREAM), over_s)
+        return None if over_s is None else OrnsteinUhlenbeckNoise(self._rng(FLICKER_STREAM), over_s)
 
     def _ripple(self) -> ExposureCourse | None:
         sensor = self._simulation.sensor
@@ -421,7 +421,7 @@ class Room:
         sensor = self._simulation.sensor
         if not sensor.black_wander_dn:
             return None
-        wander = Wander(self._rng(BLACK_STREAM), sensor.black_wander_over)
+        wander = OrnsteinUhlenbeckNoise(self._rng(BLACK_STREAM), sensor.black_wander_over)
         return lambda wall_s: sensor.black_wander_dn * wander(wall_s)
 
     def _falloff(self, height: int, width: int) -> FloatArray:

@@ -8,7 +8,7 @@ WAVES = 300
 ZERO_S = 1_767_225_600.0
 
 
-class Wander:
+class OrnsteinUhlenbeckNoise:
     """Standard normal numbers over time with the covariance exp(−|Δt|/τ), as an AR(1) process has.
 
     The process is a sum of waves of random frequency, distributed as its power spectrum is, a

@@ -29,7 +29,7 @@ from platformdirs import user_cache_dir
 from labrig.cli.exit_codes import guarded
 from tests.forked import forked
 
-MOST_BYTES, MOST_S, HANG_S = 1 << 30, 10.0, 60.0
+MAX_BYTES, MAX_S, HANG_S = 1 << 30, 10.0, 60.0
 #: Time after which a command that serves pages is ended, as somebody does by Ctrl-C.
 SERVED_S = 3.0
 #: Beginnings of lines that are no complaint.
@@ -803,9 +803,9 @@ def watched(
         wrong.append("somebody was called")
     if hung:
         wrong.append(f"did not end within {HANG_S:g} s")
-    if took_s > MOST_S:
+    if took_s > MAX_S:
         wrong.append(f"took {took_s:.1f} s")
-    if peak_bytes > MOST_BYTES:
+    if peak_bytes > MAX_BYTES:
         wrong.append(f"took {peak_bytes / 1e6:.0f} MB")
     if any("Traceback" in line or "a fault in labrig" in line for line in lines):
         wrong.append("a fault")

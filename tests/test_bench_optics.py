@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from labrig.acquire import Optics, read_rig_file
-from labrig.bench_optics import camera_curves, led_exposures, require_optics, with_shipped_camera
+from labrig.bench_optics import camera_curves, led_sources, require_optics, with_shipped_camera
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 
@@ -57,8 +57,8 @@ def test_leds_of_the_rig_file_shine_through_the_polariser(
     rig: Callable[..., Path], tmp_path: Path
 ) -> None:
     film = write_curve(tmp_path / "film.csv", {380: 0.0, 410: 0.4, 700: 0.4})
-    bare = led_exposures(read_rig_file(rig()), "rig.yaml")["405 nm"].light
-    polarised = led_exposures(read_rig_file(rig(polarisers="crossed", polariser=film)), "rig.yaml")[
+    bare = led_sources(read_rig_file(rig()), "rig.yaml")["405 nm"].light
+    polarised = led_sources(read_rig_file(rig(polarisers="crossed", polariser=film)), "rig.yaml")[
         "405 nm"
     ].light
     passed = np.interp(bare.wavelength_nm, [380, 410, 700], [0, 0.4, 0.4])

@@ -18,7 +18,7 @@ from labrig.acquire import (
     ProtocolModel,
     RigFile,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     at,
     plan,
@@ -74,7 +74,7 @@ class TimedShot:
     def run(self, session: Session) -> None:
         session.perform(LAMP_ON)
         session.wait(300.0, "charging")
-        frame = Shoot("decay", ExposureSettings(1.0, 400, 4.0))
+        frame = TakeFrame("decay", ExposureSettings(1.0, 400, 4.0))
         session.run_sequence(
             [
                 at(0.0, LAMP_OFF),
@@ -208,7 +208,7 @@ def test_the_watchdog_is_fed_between_frames(rig: Make, tmp_path: Path) -> None:
 
     class Decay(TimedShot):
         def run(self, session: Session) -> None:
-            frame = Shoot("decay", ExposureSettings(1.0, 400, 4.0))
+            frame = TakeFrame("decay", ExposureSettings(1.0, 400, 4.0))
             frames = [at(0.6 + 10.0 * number, frame) for number in range(16)]
             session.run_sequence([at(0.0, DOOR_OPEN), *frames])
 

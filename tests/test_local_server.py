@@ -6,12 +6,12 @@ import urllib.request
 
 import pytest
 
-from labrig.local_server import MAX_CONNECTIONS, LocalConversation, LocalServer
+from labrig.local_server import MAX_CONNECTIONS, LocalServer, RequestHandler
 
 
 @pytest.fixture
 def server() -> LocalServer:
-    return LocalServer(0, LocalConversation)
+    return LocalServer(0, RequestHandler)
 
 
 def said(server: LocalServer, request: str) -> bytes:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from contextlib import ExitStack
 
-from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
+from labrig.acquire import CameraCapabilities, Connections, ExposureSettings, Finding, Frame
 from labrig.foundation.errors import DeviceError, DeviceLostError
 
 from .checks import findings
@@ -97,7 +97,7 @@ class Gphoto2Camera:
         ]
         return ", ".join(parts)
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the exposure settings that the camera offers now.
 
         Raises
@@ -106,7 +106,7 @@ class Gphoto2Camera:
             The camera offers no settings that the rig file allows, for example because its dial is
             not at M.
         """
-        return self._exposure.offers()
+        return self._exposure.capabilities()
 
     def findings(self) -> Sequence[Finding]:
         """Return findings on the camera's settings, as far as libgphoto2 reports them.

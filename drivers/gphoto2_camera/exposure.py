@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from labrig.acquire import CameraOffers, ExposureSettings
+from labrig.acquire import CameraCapabilities, ExposureSettings
 from labrig.foundation.errors import DeviceError
 
 from .labels import SAME_F_NUMBER, f_number, iso, label_of_time, true_times_s
@@ -36,7 +36,7 @@ class Exposure:
         self._iso = _needed(library, ISO, "sensitivity (ISO)")
         self._aperture = library.first_of(APERTURE)
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the camera's own lists, less what the rig file excludes.
 
         Raises
@@ -54,7 +54,7 @@ class Exposure:
                 f"the camera offers none of the rig file's {missing}: turn its dial to M, or "
                 "correct the rig file"
             )
-        return self._settings.offers(exposures_s, allowed, self._apertures().values())
+        return self._settings.capabilities(exposures_s, allowed, self._apertures().values())
 
     def apply(self, requested: ExposureSettings) -> None:
         """Set what is not in force already, read back.

@@ -17,7 +17,7 @@ SAME_SHUTTER_STOPS = 0.05
 #: Neighbouring aperture labels differ by 6 % or more.
 SAME_F_NUMBER = 0.02
 #: Longest time on a dial; longer ones are a timer's, in actual seconds.
-LONGEST_ON_DIAL_S = 30.0
+MAX_ON_DIAL_S = 30.0
 #: Steps of a stop.
 _THIRDS, _HALVES = 3, 2
 
@@ -43,14 +43,14 @@ def true_times_s(labels: Iterable[str]) -> dict[str, float]:
     The number of labels shows whether a camera counts in thirds or in halves of a stop.
     """
     nominal = {label: time_s for label in labels if (time_s := labelled_time_s(label)) is not None}
-    dial = {label: time_s for label, time_s in nominal.items() if time_s <= LONGEST_ON_DIAL_S}
+    dial = {label: time_s for label, time_s in nominal.items() if time_s <= MAX_ON_DIAL_S}
     steps = _steps_of_a_stop(dial.values())
     return nominal | {label: _true_time_s(time_s, steps) for label, time_s in dial.items()}
 
 
 def labelled_times_s(time_s: float) -> tuple[float, ...]:
     """Return the actual times of a nominal one in seconds, in thirds and in halves of a stop."""
-    if time_s > LONGEST_ON_DIAL_S:
+    if time_s > MAX_ON_DIAL_S:
         return (time_s, time_s)
     return (_true_time_s(time_s, _THIRDS), _true_time_s(time_s, _HALVES))
 

@@ -5,12 +5,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from labrig.acquire import CameraOffers, FramePixels, frame_bytes
+from labrig.acquire import CameraCapabilities, FramePixels, frame_bytes
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, SizeBytes
 
 #: In thirds of a stop, from 32 s down to 1/8192 s.
-_LONGEST_THIRDS, _SHORTEST_THIRDS = 15, -39
+_MAX_THIRDS, _MIN_THIRDS = 15, -39
 
 Positive = Annotated[DurationS, Field(gt=0)]
 
@@ -69,16 +69,16 @@ class Gphoto2CameraSettings(FrozenModel):
         """Return whether `exposure_s` seconds are within `longest_exposure`."""
         return exposure_s <= self.longest_exposure * 1.0001
 
-    def planned_offers(self) -> CameraOffers:
+    def planned_offers(self) -> CameraCapabilities:
         """Return the offers assumed without the camera: shutter times in thirds of a stop."""
-        times_s = (2.0 ** (n / 3) for n in range(_SHORTEST_THIRDS, _LONGEST_THIRDS + 1))
-        return self.offers(filter(self.allows_exposure, times_s), self.isos, self.f_numbers)
+        times_s = (2.0 ** (n / 3) for n in range(_MIN_THIRDS, _MAX_THIRDS + 1))
+        return self.capabilities(filter(self.allows_exposure, times_s), self.isos, self.f_numbers)
 
-    def offers(
+    def capabilities(
         self, exposures_s: Iterable[float], isos: Iterable[int], f_numbers: Iterable[float]
-    ) -> CameraOffers:
+    ) -> CameraCapabilities:
         """Return offers with this file's time and size of a frame."""
-        return CameraOffers(
+        return CameraCapabilities(
             exposures_s=tuple(sorted(set(exposures_s))),
             isos=tuple(sorted(set(isos))),
             f_numbers=tuple(sorted(set(f_numbers))),

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from typing import Protocol
 
-from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
+from labrig.acquire import CameraCapabilities, Connections, ExposureSettings, Finding, Frame
 from labrig.foundation.errors import DeviceError, DeviceLostError
 
 from .eos.codes import labelled_times_s as eos_times_s
@@ -27,7 +27,7 @@ class Body(Protocol):
     def give_back(self) -> None:
         """Give the camera back to its own buttons."""
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the exposure settings that the camera offers now."""
 
     def findings(self) -> Sequence[Finding]:
@@ -116,7 +116,7 @@ class PtpCamera:
         """Return model, serial number and firmware that the camera reported."""
         return str(self._info)
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the exposure settings that the camera offers now.
 
         Raises
@@ -125,7 +125,7 @@ class PtpCamera:
             The camera offers no settings that the rig file allows, for example because its dial is
             not at M.
         """
-        return self._body.offers()
+        return self._body.capabilities()
 
     def findings(self) -> Sequence[Finding]:
         """Return findings on dial, lens switch and menus, as far as the camera reports them.

@@ -28,7 +28,7 @@ SESSION_LOST = (0x2003, 0x2004)
 #: Left-over containers of earlier transactions that are passed over before giving up.
 MAX_STALE = 32
 FIRST_BACK_OFF_S = 0.02
-LONGEST_BACK_OFF_S = 0.5
+MAX_BACK_OFF_S = 0.5
 #: More than any answer but a frame: an EOS lists its properties in some 20 kB.
 MAX_ANSWER_BYTES = 4 * 1024 * 1024
 
@@ -197,7 +197,7 @@ class Session:
                     response.code,
                 )
             self._clock.sleep(back_off_s)
-            back_off_s = min(2 * back_off_s, LONGEST_BACK_OFF_S)
+            back_off_s = min(2 * back_off_s, MAX_BACK_OFF_S)
 
     def _lacks_card(self) -> bool:
         """Return whether a camera that stays busy says that no card is in it.

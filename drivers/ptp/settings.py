@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from labrig.acquire import CameraOffers, FramePixels, frame_bytes
+from labrig.acquire import CameraCapabilities, FramePixels, frame_bytes
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, SizeBytes
 
@@ -85,10 +85,10 @@ class PtpCameraSettings(FrozenModel):
             return NativeIsos(self.isos, "rig file")
         return isos_of_model(model)
 
-    def planned_offers(self) -> CameraOffers:
+    def planned_offers(self) -> CameraCapabilities:
         """Return the expected offers of a camera with these settings, in thirds of a stop."""
         times_s = (shutter_time_s(code) for code in third_stop_codes())
-        return CameraOffers(
+        return CameraCapabilities(
             exposures_s=(
                 *sorted(t for t in times_s if t and self.allows_exposure(t)),
                 *self.bulb_times_s,

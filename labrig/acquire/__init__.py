@@ -39,7 +39,7 @@ from labrig.acquire.running_programs import Program, linux_programs, running_pro
 from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import (
     TYPICAL_BYTES_PER_PIXEL,
-    CameraOffers,
+    CameraCapabilities,
     ExposureSettings,
     Frame,
     FramePixels,
@@ -55,7 +55,7 @@ __all__ = [
     "TYPICAL_BYTES_PER_PIXEL",
     "Board",
     "CalibrationRules",
-    "CameraOffers",
+    "CameraCapabilities",
     "Channel",
     "Connections",
     "DeviceEntry",

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.acquire.roles import DeviceAction, ReadSpectrum, Shoot
+from labrig.acquire.roles import DeviceAction, ReadSpectrum, TakeFrame
 from labrig.foundation.quantity import duration_text
 
 
@@ -32,7 +32,7 @@ class UndoManualStep(Exception):  # noqa: N818, a wish and no error
     """Request of a person to undo the last step done by hand and to do its unit again."""
 
 
-Action = DeviceAction | Shoot | ReadSpectrum
+Action = DeviceAction | TakeFrame | ReadSpectrum
 
 
 @dataclass(frozen=True)
@@ -93,5 +93,5 @@ class LateAction:
 
     def __str__(self) -> str:
         action = self.timed.action
-        what = str(action) if isinstance(action, Shoot) else f"{action.device} {action}"
+        what = str(action) if isinstance(action, TakeFrame) else f"{action.device} {action}"
         return f"{what} by {duration_text(self.late_s)}"

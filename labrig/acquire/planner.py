@@ -15,7 +15,7 @@ from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import CAMERA, ROLES, Device
 from labrig.acquire.roles.camera import PlannedCamera
 from labrig.acquire.session import TOLERANCE_S, Session
-from labrig.acquire.values import CameraOffers, Frame
+from labrig.acquire.values import CameraCapabilities, Frame
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.quantity import duration_text
@@ -63,7 +63,7 @@ class Plan:
         Names of the units in order.
     unit_ends_s
         End of each unit in seconds after the start of the run.
-    offers
+    capabilities
         Settings that the camera offers.
     patches
         Largest number of patches of a unit.
@@ -72,7 +72,7 @@ class Plan:
     steps: tuple[Step, ...]
     units: tuple[str, ...]
     unit_ends_s: tuple[float, ...]
-    offers: CameraOffers
+    capabilities: CameraCapabilities
     patches: int = 1
 
     @property
@@ -93,7 +93,7 @@ class Plan:
     def size(self, done: Collection[str] = ()) -> RunSize:
         """Return the size on disk to be expected of the units that are not done yet."""
         frames = sum(step.device == CAMERA.key and step.unit not in done for step in self.steps)
-        return RunSize.expected(frames, self.offers.frame_bytes, self.patches)
+        return RunSize.expected(frames, self.capabilities.frame_bytes, self.patches)
 
     @property
     def manual_steps(self) -> tuple[str, ...]:
@@ -136,7 +136,10 @@ T = TypeVar("T")
 
 
 def plan(
-    protocol: ProtocolModel, rig: RigFile, source: str, offers: CameraOffers | None = None
+    protocol: ProtocolModel,
+    rig: RigFile,
+    source: str,
+    capabilities: CameraCapabilities | None = None,
 ) -> Plan:
     """Lay out a protocol on the devices of a rig without opening any of them.
 
@@ -151,7 +154,7 @@ def plan(
         Rig file with the devices.
     source
         Name or path of the rig file, for messages.
-    offers
+    capabilities
         Settings that the connected camera offers; None for those that the rig file declares.
 
     Returns
@@ -181,12 +184,12 @@ def plan(
     clock = bench.clock
     assert isinstance(clock, VirtualClock)
     protocol = protocol.resolved_for(rig)
-    if offers is not None:
-        bench.devices[CAMERA.key] = PlannedCamera(clock, offers)
-    offers = bench[CAMERA].offers() if CAMERA in bench else CameraOffers((), ())
-    if offers.frame_pixels is not None:
-        require_inside(protocol.named_regions(), offers.frame_pixels)
-    recorder = _PlanRecorder(clock, offers.overhead_s)
+    if capabilities is not None:
+        bench.devices[CAMERA.key] = PlannedCamera(clock, capabilities)
+    capabilities = bench[CAMERA].capabilities() if CAMERA in bench else CameraCapabilities((), ())
+    if capabilities.frame_pixels is not None:
+        require_inside(protocol.named_regions(), capabilities.frame_pixels)
+    recorder = _PlanRecorder(clock, capabilities.overhead_s)
     units, unit_ends_s = protocol.units(), []
     for unit in units:
         recorder.unit = unit.name
@@ -196,7 +199,7 @@ def plan(
         tuple(recorder.steps),
         tuple(unit.name for unit in units),
         tuple(unit_ends_s),
-        offers,
+        capabilities,
         max((len(protocol.patches_of(unit.name)) for unit in units), default=1) or 1,
     )
 

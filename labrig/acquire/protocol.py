@@ -9,12 +9,12 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
-from labrig.acquire.values import CameraOffers
+from labrig.acquire.values import CameraCapabilities
 from labrig.calibration import CalibrationKind
 from labrig.foundation.errors import ProtocolError, UsageError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import LengthMm, MassPerArea
-from labrig.foundation.region import LEAST_PIXELS, IsRegion, Region, region_pixels
+from labrig.foundation.region import MIN_PIXELS, IsRegion, Region, region_pixels
 from labrig.record import FrameRole, unit_in
 
 
@@ -61,9 +61,9 @@ def require_inside(regions: Mapping[str, Region], frame_pixels: tuple[int, int])
             _, _, width, height = region_pixels(region, *frame_pixels)
         except UsageError as error:
             raise ProtocolError(f"{key}: {error}") from None
-        if width * height < LEAST_PIXELS:
+        if width * height < MIN_PIXELS:
             raise ProtocolError(
-                f"{key}: expected a region of at least {LEAST_PIXELS} pixels, got {width} × "
+                f"{key}: expected a region of at least {MIN_PIXELS} pixels, got {width} × "
                 f"{height} of a frame of {frame_pixels[0]} × {frame_pixels[1]}; from fewer the "
                 "noise cannot be estimated"
             )
@@ -181,7 +181,7 @@ class ProtocolModel(FrozenModel):
         """
         return self
 
-    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+    def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
         """Return how repeated frames are spaced in time, in lines for a plan; mostly none."""
         return ()
 

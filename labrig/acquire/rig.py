@@ -18,7 +18,7 @@ from labrig.foundation.errors import (
 #: Time for which a command that a device does not confirm is repeated.
 PATIENCE_S = 30.0
 #: First and longest pause between two rounds of commands.
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.1, 2.0
+FIRST_PAUSE_S, MAX_PAUSE_S = 0.1, 2.0
 
 
 class Rig:
@@ -204,7 +204,7 @@ def require(
         if not pending or clock.now() >= deadline_s:
             return failures
         clock.sleep(pause_s)
-        pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+        pause_s = min(2 * pause_s, MAX_PAUSE_S)
 
 
 def _is_gone(error: Exception) -> bool:

@@ -122,7 +122,7 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 #: normal, from which a surface's gloss does not reach the camera.
 GLOSS_DEG = 30.0
 #: Largest angle of light or camera against the normal.
-LARGEST_DEG = 85
+MAX_DEG = 85
 
 
 class DeviceEntry(BaseModel):
@@ -264,9 +264,9 @@ class Optics(FrozenModel):
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:
-        if self.geometry is not None and max(map(int, self.geometry.split("/"))) > LARGEST_DEG:
+        if self.geometry is not None and max(map(int, self.geometry.split("/"))) > MAX_DEG:
             raise ValueError(
-                f"geometry: expected angles up to {LARGEST_DEG} degrees against the normal, such "
+                f"geometry: expected angles up to {MAX_DEG} degrees against the normal, such "
                 f"as 45/0, got {self.geometry}"
             )
         if self.polariser is not None and self.polarisers is None:

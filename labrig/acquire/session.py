@@ -22,7 +22,7 @@ from labrig.acquire.roles import (
     Guarded,
     KeptAwake,
     ReadSpectrum,
-    Shoot,
+    TakeFrame,
 )
 from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import ExposureSettings, Frame
@@ -258,7 +258,7 @@ class Session:
         """
         late_actions = []
         self._read_lights_before([timed.action for timed in sequence])
-        photographs = [timed.action for timed in sequence if isinstance(timed.action, Shoot)]
+        photographs = [timed.action for timed in sequence if isinstance(timed.action, TakeFrame)]
         if photographs:
             self._prepare(photographs.pop(0))
         start_s = self.clock.now()
@@ -269,10 +269,10 @@ class Session:
             self._execute(timed.action, late_s)
             if late_s > tolerance_s:
                 late_actions.append(LateAction(timed, late_s))
-            if isinstance(timed.action, Shoot) and photographs:
+            if isinstance(timed.action, TakeFrame) and photographs:
                 self._prepare(photographs.pop(0))
         if moves := [
-            str(late) for late in late_actions if not isinstance(late.timed.action, Shoot)
+            str(late) for late in late_actions if not isinstance(late.timed.action, TakeFrame)
         ]:
             self.warn(
                 f"began late: {', '.join(moves)}; the times at which it happened are recorded "
@@ -394,7 +394,7 @@ class Session:
 
     def _read_lights_before(self, actions: Sequence[Action]) -> None:
         self._lights.read_before(
-            [action for action in actions if not isinstance(action, Shoot | ReadSpectrum)]
+            [action for action in actions if not isinstance(action, TakeFrame | ReadSpectrum)]
         )
 
     def _heartbeat_if_due(self) -> None:
@@ -416,7 +416,7 @@ class Session:
         return {k: d for k, d in self.rig.devices.items() if isinstance(d, KeptAwake)}
 
     def _prepare(self, action: Action) -> None:
-        if not isinstance(action, Shoot):
+        if not isinstance(action, TakeFrame):
             return
         camera = self.rig[CAMERA]
         with device_errors(CAMERA.key):
@@ -427,7 +427,7 @@ class Session:
             camera.arm()
 
     def _execute(self, action: Action, late_s: float) -> None:
-        if isinstance(action, Shoot):
+        if isinstance(action, TakeFrame):
             self._observer.doing(str(action))
             with device_errors(CAMERA.key):
                 frame = self.rig[CAMERA].shoot()

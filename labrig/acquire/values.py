@@ -91,7 +91,7 @@ def shutter_text(exposure_s: float) -> str:
 
 
 @dataclass(frozen=True)
-class CameraOffers:
+class CameraCapabilities:
     """Settings that a camera offers, each in ascending order, and the cost of a frame.
 
     Attributes

@@ -11,7 +11,7 @@ from labrig.foundation.errors import FitError, UsageError
 from labrig.results import Series, TableLayout, read_described_series
 
 #: Spans of the rows from them beyond which a switching of the lamp is by another clock.
-MOST_SPANS_AWAY = 10.0
+MAX_SPANS_AWAY = 10.0
 ORDERS = ("auto", "first", "general")
 
 
@@ -146,7 +146,7 @@ def _lamp_s(path: Path, option: str, text: str, series: Series) -> float:
         raise UsageError(f"{path}: {option}: {error}") from None
     first_s, last_s = float(series.t_s.min()), float(series.t_s.max())
     span_s = last_s - first_s
-    if not first_s - MOST_SPANS_AWAY * span_s <= at_s <= last_s + MOST_SPANS_AWAY * span_s:
+    if not first_s - MAX_SPANS_AWAY * span_s <= at_s <= last_s + MAX_SPANS_AWAY * span_s:
         begin, end = (series.clock.text(t_s) for t_s in (first_s, last_s))
         raise UsageError(
             f"{path}: {option}: expected a time by the table's clock, whose rows are from {begin} "

@@ -13,7 +13,7 @@ import numpy as np
 
 from labrig.acquire import MONOCHROMATOR, driver_and_settings
 from labrig.analyse.inputs import AnalysisContext
-from labrig.bench_optics import filter_transmittances, led_exposures
+from labrig.bench_optics import filter_transmittances, led_sources
 from labrig.calibration import LEDS_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
@@ -35,7 +35,7 @@ SMOOTHED, SEEN = 5, 4.0
 #: Distance from the middle of a light, in its standard deviations, within which all of it lies.
 NEAR = 5.0
 #: Fraction of the lamp's strongest counts below which its light is not seen.
-LEAST_LAMP = 2e-3
+MIN_LAMP = 2e-3
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ def exciting_lights(
     if context.run.spectra(CardSpectra.DIRECT):
         return [_measured(context, name, lamp) for name in lights.names()]
     if lights.leds:
-        known = led_exposures(context.rig, context.rig.name, context.inputs[LEDS_KIND])
+        known = led_sources(context.rig, context.rig.name, context.inputs[LEDS_KIND])
         if missing := [name for name in lights.leds if name not in known]:
             raise UsageError(
                 f"rig '{context.rig.name}': expected an LED '{missing[0]}', got {', '.join(known)}"
@@ -118,7 +118,7 @@ def _measured(context: AnalysisContext, name: str, lamp: Spectrum) -> ExcitingLi
     }
     grid_nm, of_lamp, lamp_sigma = _mean_rate(context.run.spectra(CardSpectra.DIRECT), dark)
     _, rate, sigma = _mean_rate(readings, dark)
-    is_lit = of_lamp > np.maximum(SEEN * lamp_sigma, LEAST_LAMP * of_lamp.max())
+    is_lit = of_lamp > np.maximum(SEEN * lamp_sigma, MIN_LAMP * of_lamp.max())
     if np.count_nonzero(is_lit) < SMOOTHED:
         raise DataError(
             f"{context.run.folder}: expected the lamp's light in the "

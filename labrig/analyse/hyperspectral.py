@@ -12,13 +12,13 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from labrig.fit import LitSpectrum, bispectral_columns
+from labrig.fit import IlluminatedSpectrum, bispectral_columns
 from labrig.fit.bispectral import BispectralColumns, light_window_nm, separate_columns
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.models import FrozenModel
-from labrig.foundation.region import LEAST_PIXELS, Region, region_pixels
+from labrig.foundation.region import MIN_PIXELS, Region, region_pixels
 from labrig.optics import (
     HyperspectralCube,
     Transmittance,
@@ -54,7 +54,7 @@ def direct_columns(
 #: Width of the bands of the light that comes back, and the longest wavelength, in nm.
 BAND_NM, LAST_NM = 10.0, 780.0
 #: Least number of those bands.
-LEAST_BANDS = 5
+MIN_BANDS = 5
 
 
 class LightCube(FrozenModel):
@@ -133,8 +133,8 @@ class _Region:
     common: float
 
     @property
-    def lit(self) -> LitSpectrum:
-        return LitSpectrum(self.wavelength_nm, self.value, self.sigma)
+    def lit(self) -> IlluminatedSpectrum:
+        return IlluminatedSpectrum(self.wavelength_nm, self.value, self.sigma)
 
 
 def matrix_from_cubes(cubes: CubeList, source: Path) -> tuple[DirectColumns, str]:
@@ -204,9 +204,9 @@ def matrix_from_cubes(cubes: CubeList, source: Path) -> tuple[DirectColumns, str
     nm = samples[0].wavelength_nm
     first_nm, last_nm = BAND_NM * np.ceil(nm[0] / BAND_NM), min(nm[-1], LAST_NM)
     output_nm = np.arange(first_nm, last_nm + 1e-6, BAND_NM)
-    if len(output_nm) < LEAST_BANDS:
+    if len(output_nm) < MIN_BANDS:
         raise DataError(
-            f"{source}: expected images of {LEAST_BANDS * BAND_NM:g} nm or more below "
+            f"{source}: expected images of {MIN_BANDS * BAND_NM:g} nm or more below "
             f"{LAST_NM:g} nm, got {nm[0]:g} nm to {nm[-1]:g} nm"
         )
     windows = []
@@ -244,9 +244,9 @@ def _mean(
     try:
         lines, samples, _ = image.values.shape
         _, _, wide, high = region_pixels(region, samples, lines)
-        if wide * high < LEAST_PIXELS:
+        if wide * high < MIN_PIXELS:
             raise DataError(
-                f"expected a region of {LEAST_PIXELS} pixels or more, of whose scatter σ is made; "
+                f"expected a region of {MIN_PIXELS} pixels or more, of whose scatter σ is made; "
                 f"got {wide * high}"
             )
         pixels = image.pixels(region)

@@ -10,7 +10,7 @@ import numpy as np
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import TYPICAL_FLICKER
-from labrig.bench_optics import LedExposure
+from labrig.bench_optics import LightSource
 from labrig.calibration import CAMERA_KIND
 from labrig.fit.fluorescence import Exposure, FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL, SKEW_SIGMA, WIDTH_SIGMA
@@ -30,7 +30,7 @@ LightKind = Literal["LED", "lamp", "light"]
 
 #: Least part of a variance that channels do not have in common: each frame weighs a little
 #: differently in them.
-LEAST_OWN = 0.01
+MIN_OWN = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class LitPatch:
     def own_variance(self) -> FloatArray:
         """Variances of the values without the flicker that is common, shape (m, k)."""
         own = self.variance - np.square(self.flicker[:, np.newaxis] * self.value)
-        return np.maximum(own, LEAST_OWN * self.variance)
+        return np.maximum(own, MIN_OWN * self.variance)
 
     @property
     def covariance(self) -> FloatArray:
@@ -256,7 +256,7 @@ LAMP_ERROR = CurveError(relative=0.08, added=0.01, correlation_nm=40.0)
 DRIFT = 0.01
 
 
-def exposure_of(light: LedExposure) -> Exposure:
+def exposure_of(light: LightSource) -> Exposure:
     """Return a light of unknown brightness, with the errors of its spectrum.
 
     The shape of one that is nominal is not known either, nor that of a lamp by another one's file.
@@ -267,7 +267,7 @@ def exposure_of(light: LedExposure) -> Exposure:
 
 
 def lit_system(
-    lights: Sequence[LedExposure], camera: CameraResponse, white: Transmittance, card: LitPatch
+    lights: Sequence[LightSource], camera: CameraResponse, white: Transmittance, card: LitPatch
 ) -> FluorescenceSystem:
     """Return the system of some LEDs, lamps and a camera.
 

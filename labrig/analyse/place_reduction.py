@@ -40,7 +40,7 @@ ROUNDS = 8
 #: Scatter relative to the expected one from which it is not noise.
 OUTLIER = 10.0
 #: Fewest strips that determine the noise of a place.
-FEWEST_STRIPS = 2
+MIN_STRIPS = 2
 
 
 def sigma_dn(noise: Sequence[NoiseModel], level_dn: FloatArray, pixels: FloatArray) -> FloatArray:
@@ -322,7 +322,7 @@ def _pair_scatters(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray
         scale = np.clip(scale, 0.0, 1e3)
         difference = second.strips - scale[:, np.newaxis] * first.strips
         strips = np.isfinite(difference).sum(axis=2)
-        few = strips < FEWEST_STRIPS
+        few = strips < MIN_STRIPS
         scatter = np.nansum(np.square(difference), axis=2) / np.maximum((strips - 1) * strips, 1)
         scatter = np.where(few, np.nan, scatter * first.pixels)
         # a + b L of the one times scale², of the other times 1.

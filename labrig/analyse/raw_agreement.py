@@ -32,7 +32,7 @@ _SAME_F_NUMBER = 1e-3
 #: Ways in which a camera of another driver may count: as labelled, or in steps of a stop.
 _UNDECLARED_STEPS = (0, 3, 2)
 #: Most frames that a message names.
-_MOST_NAMED = 3
+_MAX_NAMED = 3
 
 ExposuresOf = Callable[[float], tuple[float, ...]]
 
@@ -146,8 +146,8 @@ def clock_warnings(run: RunRecord) -> tuple[str, ...]:
     off = [jump for session in jumps for jump in session]
     if not off:
         return ()
-    names = ", ".join(reading.frame.path.name for _, reading in off[:_MOST_NAMED])
-    more = f" and {len(off) - _MOST_NAMED} more" if len(off) > _MOST_NAMED else ""
+    names = ", ".join(reading.frame.path.name for _, reading in off[:_MAX_NAMED])
+    more = f" and {len(off) - _MAX_NAMED} more" if len(off) > _MAX_NAMED else ""
     allowed_s = CLOCK_SCATTER_S + max(reading.step_s for _, reading in off)
     return (
         f"the times of {names}{more} in the journal differ from those by the camera's own clock, "
@@ -315,8 +315,8 @@ def require_recorded_settings(run: RunRecord, rig: RigFile, overrides: Overrides
         for file, text in differences.items()
     ]
     if texts:
-        more = f" and {len(texts) - _MOST_NAMED} more differ" if len(texts) > _MOST_NAMED else ""
+        more = f" and {len(texts) - _MAX_NAMED} more differ" if len(texts) > _MAX_NAMED else ""
         raise DataError(
-            f"{run.folder}: {', '.join(texts[:_MOST_NAMED])}{more}; the journal was changed after "
+            f"{run.folder}: {', '.join(texts[:_MAX_NAMED])}{more}; the journal was changed after "
             "the run: restore it from a copy"
         )

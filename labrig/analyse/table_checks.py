@@ -22,9 +22,9 @@ from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.results import Series
 
 #: Largest number of first values that are left out to see whether they are too low.
-MOST_LEFT_OUT = 3
+MAX_LEFT_OUT = 3
 #: Fewest values that have to remain.
-FEWEST_LEFT = 8
+MIN_LEFT = 8
 #: Distance below the law of the others from which a value is too low, in σ; of values that are
 #: equal, which is evidence, too.
 LOW_SIGMAS, LOW_SIGMAS_IF_EQUAL = 4.5, 1.5
@@ -68,11 +68,11 @@ def low_start(series: Series, fit: Callable[[Series], DecayFit]) -> LowStart | N
     rows = np.flatnonzero(series.usable)
     rows = rows[np.argsort(series.t_s[rows], kind="stable")]
     ceiling = _equal_maxima(series.values[rows, 0])
-    if len(rows) - ceiling >= FEWEST_LEFT and ceiling > 1:
+    if len(rows) - ceiling >= MIN_LEFT and ceiling > 1:
         sigmas = _sigmas_below(series, rows, ceiling, fit)
         if sigmas > LOW_SIGMAS_IF_EQUAL:
             return LowStart(ceiling, sigmas, is_ceiling=True)
-    numbers = range(1, min(MOST_LEFT_OUT, len(rows) - FEWEST_LEFT) + 1)
+    numbers = range(1, min(MAX_LEFT_OUT, len(rows) - MIN_LEFT) + 1)
     below = [_sigmas_below(series, rows, number, fit) for number in numbers]
     if not below or max(below) < LOW_SIGMAS:
         return None
@@ -83,11 +83,11 @@ def _equal_maxima(values: FloatArray) -> int:
     """Return how many first values (n,) are equal and the largest; 1 if that may be chance."""
     number = int(np.argmin(np.append(values == values[0], False)))
     others = values[number:]
-    if number < 2 or len(others) < FEWEST_LEFT or others.max() >= values[0]:
+    if number < 2 or len(others) < MIN_LEFT or others.max() >= values[0]:
         return 1
     steps = np.diff(np.unique(values))
     second = others[2:] - 2 * others[1:-1] + others[:-2]
-    scatter = 1.4826 * float(np.median(np.abs(second[:FEWEST_LEFT]))) / np.sqrt(6)
+    scatter = 1.4826 * float(np.median(np.abs(second[:MIN_LEFT]))) / np.sqrt(6)
     equal = float(steps.min()) / max(2 * np.sqrt(np.pi) * scatter, np.finfo(float).tiny)
     return number if min(equal, 1.0) ** (number - 1) < EQUAL_CHANCE else 1
 
@@ -118,7 +118,7 @@ def _sigmas_below(
 #: Fewest values that tell how σ follows from them.
 FEWEST = 6
 #: Relative deviation that still is rounding, and the most decimals of σ that are looked at.
-ROUNDING, MOST_DECIMALS = 1e-4, 6
+ROUNDING, MAX_DECIMALS = 1e-4, 6
 #: Range of σ in units of their rounding that tells a dependence from chance.
 RANGE_OF_ROUNDING = 6.0
 #: Least counts in a variance, since fewer would weigh a point too much.
@@ -206,7 +206,7 @@ def variance_of_values(values: FloatArray, sigma: FloatArray) -> VarianceOfValue
 
 def _last_digit(numbers: FloatArray) -> float:
     """Return the power of ten of which all numbers are multiples; 0 if there is none."""
-    for decimals in range(MOST_DECIMALS):
+    for decimals in range(MAX_DECIMALS):
         scaled = numbers * 10.0**decimals
         if np.allclose(scaled, np.round(scaled), rtol=0.0, atol=1e-6):
             return float(10.0**-decimals)

@@ -22,7 +22,7 @@ from labrig.results import Measured
 #: Change in K from which a warning is given: rates then change by 4 %, more than their usual σ.
 MOVED_K = 0.5
 #: Time over which a drift is looked for, least readings that tell it, and its significance in σ.
-DRIFT_SEEN_S, FEWEST_READINGS, CLEAR_SIGMAS = 3600.0, 20, 5.0
+DRIFT_SEEN_S, MIN_READINGS, CLEAR_SIGMAS = 3600.0, 20, 5.0
 #: Temperature of a room that nobody measured.
 ROOM_C = 21.0
 CHECK_IT = "check it before the next run (labrig rig check)"
@@ -92,13 +92,13 @@ def drift_warnings(
         Fitted rates.
     """
     photographs, readings = frames_in_roles(run, roles), run.temperatures()
-    if not photographs or len(readings) < FEWEST_READINGS:
+    if not photographs or len(readings) < MIN_READINGS:
         return ()
     first_s, last_s = photographs[0].start_time, photographs[-1].end_time
     near = [reading for reading in readings if -DRIFT_SEEN_S < reading.time - last_s < 0]
     time_s = np.array([reading.time for reading in near])
     celsius = np.array([reading.temperature_c for reading in near])
-    if len(near) < FEWEST_READINGS or np.ptp(time_s) == 0:
+    if len(near) < MIN_READINGS or np.ptp(time_s) == 0:
         return ()
     (slope, _), covariance = np.polyfit(time_s - time_s.mean(), celsius, 1, cov=True)
     moved_k = float(slope) * (last_s - first_s)

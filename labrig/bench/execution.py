@@ -14,7 +14,7 @@ from labrig.acquire import (
     SAMPLE_CHANGER,
     SPECTROMETER,
     Camera,
-    CameraOffers,
+    CameraCapabilities,
     Checkable,
     ExposureSettings,
     Plan,
@@ -115,7 +115,7 @@ class LensObserver(LoggedObserver):
 EXPOSURE_S = 1 / 60
 
 
-def offers_with_frame_size(camera: Camera) -> CameraOffers:
+def offers_with_frame_size(camera: Camera) -> CameraCapabilities:
     """Take a frame, which is not kept, and return the camera's offers with the size of its frames.
 
     Parameters
@@ -125,7 +125,7 @@ def offers_with_frame_size(camera: Camera) -> CameraOffers:
 
     Returns
     -------
-    CameraOffers
+    CameraCapabilities
         Settings that the camera offers; `frame_pixels` is that of the frame.
 
     Raises
@@ -135,21 +135,23 @@ def offers_with_frame_size(camera: Camera) -> CameraOffers:
     FrameError
         The frame cannot be read.
     """
-    offers = camera.offers()
+    capabilities = camera.capabilities()
     camera.configure(
         ExposureSettings(
-            offers.exposure_at_most(EXPOSURE_S), offers.isos[0], max(offers.f_numbers, default=None)
+            capabilities.exposure_at_most(EXPOSURE_S),
+            capabilities.isos[0],
+            max(capabilities.f_numbers, default=None),
         )
     )
     camera.arm()
     raw = read_raw(camera.shoot().data, "a trial frame")
     frame_pixels = (raw.width, raw.height)
-    if offers.frame_pixels is not None and offers.frame_pixels != frame_pixels:
+    if capabilities.frame_pixels is not None and capabilities.frame_pixels != frame_pixels:
         raise ProtocolError(
-            f"the rig file expects frames of {list(offers.frame_pixels)} pixels, the camera's have "
-            f"{list(frame_pixels)}; write frame_pixels: {list(frame_pixels)} under 'devices.camera'"
+            f"the rig file expects frames of {list(capabilities.frame_pixels)} pixels, the camera's "
+            f"have {list(frame_pixels)}; write frame_pixels: {list(frame_pixels)} under 'devices.camera'"
         )
-    return replace(offers, frame_pixels=frame_pixels)
+    return replace(capabilities, frame_pixels=frame_pixels)
 
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
@@ -400,11 +402,11 @@ def _refuse_what_the_camera_cannot(
     shows whether the regions are inside of it: not after half an hour of warming up.
     """
     try:
-        offers = camera.offers()
-        is_certain = offers.frame_pixels is not None and bench.room is not None
+        capabilities = camera.capabilities()
+        is_certain = capabilities.frame_pixels is not None and bench.room is not None
         if protocol.named_regions() and not is_certain:
-            offers = offers_with_frame_size(camera)
-        plan(protocol, bench.file, bench.source, offers)
+            capabilities = offers_with_frame_size(camera)
+        plan(protocol, bench.file, bench.source, capabilities)
     except ProtocolError as error:
         if folder.read().attempts:
             files = " and ".join(str(folder.path / name) for name in ("protocol.yaml", "rig.yaml"))

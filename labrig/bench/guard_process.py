@@ -32,7 +32,7 @@ from labrig.foundation.errors import LabrigError
 
 #: Pauses between two attempts. The first ones are short: the port of a killed process is free some
 #: milliseconds after its end.
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0
+FIRST_PAUSE_S, MAX_PAUSE_S = 0.02, 2.0
 
 
 def main() -> None:
@@ -116,7 +116,7 @@ class Lights:
                     is_off = True  # what is opened was switched off and read back
             except Exception:  # nobody is there to be told, and the next try may do it
                 self._clock.sleep(pause_s)
-                pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+                pause_s = min(2 * pause_s, MAX_PAUSE_S)
 
 
 def _listen(source: BinaryIO, messages: "queue.Queue[bytes]") -> None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from labrig.material import Material, MatrixLayout, ReradiationMatrix
 
 #: Most wavelengths that an option states, and how far the last may be from a step, in nm.
-_MOST_STEPS, _ROUNDING_NM = 10_000, 1e-6
+_MAX_STEPS, _ROUNDING_NM = 10_000, 1e-6
 #: Lights under which colours are described unless others are asked for.
 LIGHTS = ("D65", "A", "450nm")
 
@@ -140,7 +140,7 @@ def _steps_nm(text: str) -> "npt.NDArray[np.float64]":
     except ValueError:
         raise UsageError(expected) from None
     count = round((last - first) / step) if step else -1
-    if not 1 <= count < _MOST_STEPS or abs(first + count * step - last) > _ROUNDING_NM:
+    if not 1 <= count < _MAX_STEPS or abs(first + count * step - last) > _ROUNDING_NM:
         raise UsageError(expected)
     return first + step * np.arange(count + 1.0)
 

@@ -68,17 +68,17 @@ def summary(recording: "Recording", free_bytes: int) -> list[str]:
     if by_hand and "changer" in rig.devices:
         hand_text += "; with --yes the rig's changer does them"
     measured = measurement(recording.protocol.protocol, recording.protocol.sample.name)
-    pixels = plan.offers.frame_pixels
+    pixels = plan.capabilities.frame_pixels
     frame_text = "" if pixels is None else f" of {pixels[0]} × {pixels[1]} pixels"
     return [
         f"{measured}, on {rig.name}",
         f"  lab time  at most {duration_text(plan.duration_s)}, {counted(len(plan.units), 'unit')}",
         f"  by hand   {hand_text}",
         f"  frames    at most {plan.frames}{frame_text}",
-        *(f"            {line}" for line in recording.protocol.frame_spacing(plan.offers)),
+        *(f"            {line}" for line in recording.protocol.frame_spacing(plan.capabilities)),
         f"  disk      about {size_text(size.total_bytes)}, {size_text(free_bytes)} are free",
-        f"            frames {size_text(size.frames_bytes)} ({size_text(plan.offers.frame_bytes)} "
-        f"each), results {size_text(size.results_bytes)}",
+        f"            frames {size_text(size.frames_bytes)} "
+        f"({size_text(plan.capabilities.frame_bytes)} each), results {size_text(size.results_bytes)}",
         *(_deed("network", sentence, "") for sentence in calls(rig.addresses())),
         *_at_end(rig.on_finish),
     ]

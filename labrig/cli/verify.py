@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from labrig.seal import LabKey, Signers
 
 #: Most changes that are named in one line.
-_MOST_NAMED = 6
+_MAX_NAMED = 6
 
 Runs = Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")]
 
@@ -59,7 +59,7 @@ def verify(
     for line in verification.doubtful:
         typer.echo(f"warning: {line}", err=True)
     if not verification.is_intact:
-        named, more = verification.changed[:_MOST_NAMED], verification.changed[_MOST_NAMED:]
+        named, more = verification.changed[:_MAX_NAMED], verification.changed[_MAX_NAMED:]
         others = f"; {len(more)} more, all of them with --json" if more else ""
         raise DataError(f"{'; '.join(named)}{others}")
     if signers is not None and verification.signer is None:

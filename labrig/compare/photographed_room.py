@@ -36,7 +36,7 @@ from labrig.reproduce import CARD_NAME, DarkRoomLamp, DarkRoomPicture, Renderer,
 from labrig.results import ChainResult, ResultWithDecays, RunResult, Series, write_csv
 
 #: Height of the frame in the rendering; its light is even on every sample.
-HEIGHT_PX, MOST_PX = 32, 512
+HEIGHT_PX, MAX_PX = 32, 512
 #: Name of the scene's file.
 SCENE_FILE = "dark-room.yaml"
 
@@ -86,7 +86,7 @@ def fractions_of(region: Region, layout: SensorLayout) -> Region:
 def picture_of(layout: SensorLayout) -> DarkRoomPicture:
     """Return a small picture with the aspect of a sensor."""
     aspect = layout.width / layout.height
-    width_px = min(max(round(HEIGHT_PX * aspect), 1), MOST_PX)
+    width_px = min(max(round(HEIGHT_PX * aspect), 1), MAX_PX)
     return DarkRoomPicture(width_px, max(round(width_px / aspect), 8))
 
 

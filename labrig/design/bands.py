@@ -238,7 +238,7 @@ def _d65_power() -> float:
 
 
 #: Lights under which a reflectance is to look as its three channels.
-MOST_LIGHTS = 40
+MAX_LIGHTS = 40
 #: Weight of a reflectance's second differences over that of its colours.
 SMOOTHNESS = 3e-2
 
@@ -308,7 +308,7 @@ class Conversion:
         """
         if self.bands.edges_nm is None:
             lit = np.unique(lights[lights.any(axis=1)], axis=0)
-            lit = lit[:: math.ceil(len(lit) / MOST_LIGHTS) or 1]
+            lit = lit[:: math.ceil(len(lit) / MAX_LIGHTS) or 1]
             lit = lit / lit.max(axis=1, keepdims=True, initial=1e-300)
             seen = np.concatenate([self.to_rgb * light for light in self.light(lit)])
             return smooth_reflectance((albedo * lit).ravel(), seen)

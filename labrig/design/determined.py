@@ -23,7 +23,7 @@ POOR = 0.3
 #: σ of an albedo from which it is not determined.
 POOR_ALBEDO = 0.15
 #: Conflicts that are named, and the ΔE2000 from which a key is seen not to be met.
-MOST_CONFLICTS, SEEN = 3, 1.0
+MAX_CONFLICTS, SEEN = 3, 1.0
 #: Part of a key's own squares that another key has to cost it to be said to work against it.
 WORTH_SAYING = 0.2
 
@@ -162,4 +162,4 @@ def visible_conflicts(found: Sequence[Conflict], delta_e2000: FloatArray) -> tup
     for conflict in found:
         if delta_e2000[conflict.other] >= SEEN:
             pairs.setdefault(frozenset((conflict.key, conflict.other)), conflict)
-    return tuple(pairs.values())[:MOST_CONFLICTS]
+    return tuple(pairs.values())[:MAX_CONFLICTS]

@@ -41,13 +41,13 @@ def emitted_over_absorbed(
 #: Searches for the nearest material that keeps the energy, and evaluations of each.
 SEARCHES, EVALUATIONS = 4, 40
 #: Relative gain and step of a search that ends it.
-LEAST_GAIN = 1e-4
+MIN_GAIN = 1e-4
 #: Powers of the excess by which excitation rates are lowered where a search starts.
 LOWERED = (0.0, 0.5, 1.0)
 #: Relative change of a coordinate by which slopes are found.
 DIFFERENCE = 1e-5
 #: Part of an albedo that is left at least where it leaves too little light to be absorbed.
-LEAST_PART = 0.01
+MIN_PART = 0.01
 
 
 def keeping_energy(
@@ -66,8 +66,8 @@ def keeping_energy(
             bounds=(low, high),
             diff_step=np.full(len(low), DIFFERENCE),
             max_nfev=EVALUATIONS,
-            ftol=LEAST_GAIN,
-            xtol=LEAST_GAIN,
+            ftol=MIN_GAIN,
+            xtol=MIN_GAIN,
         )
         for start in starts
     ]
@@ -93,7 +93,7 @@ class _Kept:
         low, high = self.problem.bounds
         if self._given is not None:
             return low, high
-        return np.append(low, LEAST_PART), np.append(high, 1.0)
+        return np.append(low, MIN_PART), np.append(high, 1.0)
 
     def start(self, rates: FloatArray) -> FloatArray:
         """Return the coordinates of rates."""

@@ -20,7 +20,7 @@ BLACK = 1e-15
 #: Relative difference below which two keys at one place and time want the same.
 SAME = 1e-9
 #: Largest number of keys: above it nobody has set them by hand, and the search takes minutes.
-MOST_KEYS = 5000
+MAX_KEYS = 5000
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +65,8 @@ class Keys:
         wanted = np.asarray(radiance, dtype=np.float64)
         if time.ndim != 1 or not len(time):
             raise UsageError("expected at least one key, got none; say when it should glow how")
-        if len(time) > MOST_KEYS:
-            raise UsageError(f"expected at most {MOST_KEYS} keys, got {len(time)}; leave some out")
+        if len(time) > MAX_KEYS:
+            raise UsageError(f"expected at most {MAX_KEYS} keys, got {len(time)}; leave some out")
         if wanted.ndim != 2 or len(wanted) != len(time):
             raise UsageError(
                 f"expected a radiance for each of {len(time)} keys, got shape {wanted.shape}"

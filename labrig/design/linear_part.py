@@ -24,8 +24,8 @@ from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.nonnegative import nonnegative_least_squares
 
 #: Steps of all searches, and the relative gain below which one has ended.
-STEPS, LEAST_GAIN = 25, 1e-5
-INITIAL_DAMPING, LEAST_FACTOR = 1e-3, 0.1
+STEPS, MIN_GAIN = 25, 1e-5
+INITIAL_DAMPING, MIN_FACTOR = 1e-3, 0.1
 
 
 class Curvature(NamedTuple):
@@ -75,10 +75,10 @@ def descend(
         gain = at.cost - there.cost
         ratio = gain / np.maximum(expected, 1e-300)
         is_better = (gain > 0) & np.isfinite(there.cost)
-        factor = np.maximum(LEAST_FACTOR, 1 - (2 * np.clip(ratio, 0.0, 1.0) - 1) ** 3)
+        factor = np.maximum(MIN_FACTOR, 1 - (2 * np.clip(ratio, 0.0, 1.0) - 1) ** 3)
         damping = np.where(is_better, damping * factor, damping * growth)
         growth = np.where(is_better, 2.0, growth * 2)
-        has_ended = gain <= LEAST_GAIN * at.cost
+        has_ended = gain <= MIN_GAIN * at.cost
         if (is_better & has_ended).sum() == len(x):
             x, at = trial, there
             break

@@ -18,7 +18,7 @@ from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.material import Albedo, Material, Provenance, read_material
 
 #: Share below which a material is not part of a mixture.
-LEAST_SHARE = 1e-3
+MIN_SHARE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ def _mixed(design: Design, parts: Sequence[_Part]) -> NearestMaterial:
     shares = nonnegative_least_squares(columns, target)
     brightness = float(shares.sum())
     fractions = shares / brightness if brightness > 0 else np.full(len(parts), 1 / len(parts))
-    kept = [number for number in range(len(parts)) if fractions[number] > LEAST_SHARE]
+    kept = [number for number in range(len(parts)) if fractions[number] > MIN_SHARE]
     reflected = sum(
         (fractions[number] * parts[number].reflected for number in kept), np.zeros_like(wanted)
     )

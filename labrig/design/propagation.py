@@ -39,7 +39,7 @@ KEPT = 1e-4
 CLUSTERS = 400
 GOLDEN_RATIO = (math.sqrt(5) - 1) / 2
 #: Relative residual at which the linear equations are solved, and most iterations.
-SOLVED, MOST_ITERATIONS = 1e-5, 2000
+SOLVED, MAX_ITERATIONS = 1e-5, 2000
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def propagate(
     right = weight[:, np.newaxis] * change
     for channel in range(flat.shape[1]):
         solved, status = cg(
-            matrix, right[:, channel], rtol=SOLVED, maxiter=MOST_ITERATIONS, M=preconditioner
+            matrix, right[:, channel], rtol=SOLVED, maxiter=MAX_ITERATIONS, M=preconditioner
         )
         if status:
             raise DataError("expected edits that spread, got equations that were not solved")

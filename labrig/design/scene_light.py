@@ -112,7 +112,7 @@ PLACEHOLDER = 0.5
 #: Places whose light stands for that of all in spectra of a design.
 TYPICAL = 8
 #: Times at which the glow of other phosphors is kept.
-MOST_KEPT = 256
+MAX_KEPT = 256
 #: Half of the diagonal of a pixel.
 HALF_PIXEL = 0.5**0.5
 
@@ -486,7 +486,7 @@ class _OtherGlow:
     def at(self, t_s: float) -> Float32Array:
         """Return the radiance that places emit by themselves at a time (places, bands)."""
         if t_s not in self._kept:
-            if len(self._kept) >= MOST_KEPT:
+            if len(self._kept) >= MAX_KEPT:
                 self._kept.pop(next(iter(self._kept)))
             if t_s < self._renderer.t_s:
                 self._renderer = Renderer(self._scene, traced=self._traced)

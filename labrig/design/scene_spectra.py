@@ -28,9 +28,9 @@ from labrig.optics import photopic_efficacy
 #: Negative channel of a light, over its luminance, that three channels leave out.
 LEFT_OUT = 0.02
 #: Largest albedo of a surface in a scene: light has to be lost at every bounce.
-MOST_ALBEDO = 0.99
+MAX_ALBEDO = 0.99
 #: Lights under which excitation and reflection are to be those of the design.
-MOST_LIGHTS = 40
+MAX_LIGHTS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +109,12 @@ class SceneSpectra:
             lights = self._lights
             seen = np.concatenate([self.to_rgb * light for light in lights])
             wanted = (albedo * self._rgb_of(lights)).ravel()
-            return smooth_reflectance(wanted, seen, MOST_ALBEDO)
+            return smooth_reflectance(wanted, seen, MAX_ALBEDO)
         covered = self._conversion.of_light.sum(axis=1) > 0
         within = self._conversion.light(albedo)
         middle = (self.edges_nm[1:] + self.edges_nm[:-1]) / 2
         beyond = np.interp(middle, middle[covered], within[covered])
-        return np.asarray(np.minimum(np.where(covered, within, beyond), MOST_ALBEDO))
+        return np.asarray(np.minimum(np.where(covered, within, beyond), MAX_ALBEDO))
 
     @cached_property
     def _conversion(self) -> Conversion:
@@ -135,7 +135,7 @@ class SceneSpectra:
         flat = flat[flat.any(axis=1)]
         unit = flat / (flat @ self.to_rgb.T @ RGB_TO_Y)[:, np.newaxis]
         unit = np.unique(unit.round(9), axis=0)
-        return np.asarray(unit[:: -(-len(unit) // MOST_LIGHTS) or 1])
+        return np.asarray(unit[:: -(-len(unit) // MAX_LIGHTS) or 1])
 
 
 @lru_cache(maxsize=16)

@@ -51,18 +51,18 @@ SWEPT_LEVELS, SWEEPS = 14, 1
 #: Rounds of searches rate by rate, each followed by descents.
 ROUNDS = 3
 #: Entries of keys by steps of all searches that go on at once.
-MOST_ENTRIES = 2_000_000
+MAX_ENTRIES = 2_000_000
 #: κ times all of the time under the strongest light that is preferred, and the weight of that.
 PREFERRED, PREFERENCE = 1.0, 1e-5
 #: Pairs that are looked through for starts.
 LOOKED_THROUGH = 3000
 #: Evaluations of a search that starts at the end of another.
-MOST_EVALUATIONS = 40
+MAX_EVALUATIONS = 40
 #: Gain of a step, as a part of the sum of squares, that ends a search; and as a part of that of the
 #: wanted radiances, which is rounding.
-LEAST_GAIN, ROUNDED = 1e-6, 1e-20
+MIN_GAIN, ROUNDED = 1e-6, 1e-20
 #: Order from which the search for it starts, and least order above 1.
-START_ORDER, LEAST_ORDER = 1.3, 1.001
+START_ORDER, MIN_ORDER = 1.3, 1.001
 #: 1 less the cosine of the angle of two bands' lights below which they are in proportion.
 PROPORTIONAL = 1e-9
 
@@ -216,7 +216,7 @@ class Problem:
         Products of keys and steps would fill it for thousands of keys.
         """
         entries = sum(len(steps.keys) * len(steps.duration_s) for steps in self.steps)
-        return max(1, MOST_ENTRIES // max(1, entries * states))
+        return max(1, MAX_ENTRIES // max(1, entries * states))
 
     def emission_of(self, x: FloatArray, order: float) -> Emission:
         """Return the emission of states of coordinates x, with slopes by coordinates."""
@@ -292,7 +292,7 @@ def search_near(problem: Problem, *, is_order_free: bool, order: float) -> tuple
         return (_dark(problem),)
     start = problem.preferred
     if is_order_free:
-        end, _ = _refined(problem, np.append(start, max(order, LEAST_ORDER)), None)
+        end, _ = _refined(problem, np.append(start, max(order, MIN_ORDER)), None)
         return (_found(problem, end[:-1], float(end[-1])),)
     end, _ = _refined(problem, start, order)
     return (_found(problem, end, order),)
@@ -392,7 +392,7 @@ def _refined(problem: Problem, start: FloatArray, order: float | None) -> tuple[
     """Return end and sum of squares of a search; without an order it is the last parameter."""
     low, high = problem.bounds
     if order is None:
-        low, high = np.append(low, LEAST_ORDER), np.append(high, MAX_ORDER)
+        low, high = np.append(low, MIN_ORDER), np.append(high, MAX_ORDER)
     n_rates, weight = problem.n_states * problem.n_rates, problem.preference
     kept = np.eye(n_rates, len(low)) * weight
 
@@ -409,13 +409,13 @@ def _refined(problem: Problem, start: FloatArray, order: float | None) -> tuple[
         return np.concatenate([residuals, away]), np.concatenate([slopes, kept])
 
     at_start, _ = projected(start)
-    least_gain = max(LEAST_GAIN * float(at_start @ at_start), ROUNDED * problem.scale)
+    least_gain = max(MIN_GAIN * float(at_start @ at_start), ROUNDED * problem.scale)
     fit = least_squares(
         projected,
         start,
         lower=low,
         upper=high,
-        max_iterations=MOST_EVALUATIONS,
+        max_iterations=MAX_EVALUATIONS,
         tolerance=1e-9,
         least_gain=least_gain,
     )
@@ -445,7 +445,7 @@ def _descended_by_gradient(
         jac=True,
         method="L-BFGS-B",
         bounds=list(zip(low, high, strict=True)),
-        options={"maxfun": MOST_EVALUATIONS, "ftol": LEAST_GAIN / 10, "gtol": 0.0},
+        options={"maxfun": MAX_EVALUATIONS, "ftol": MIN_GAIN / 10, "gtol": 0.0},
     )
     if found.fun < end.chi2:
         return np.asarray(found.x), float(found.fun)

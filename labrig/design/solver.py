@@ -29,17 +29,17 @@ from labrig.foundation.errors import UsageError
 from labrig.material import MAX_ORDER
 
 #: Most states of a design: a person's keys do not determine more.
-MOST_STATES = 2
+MAX_STATES = 2
 #: Relative σ with which a key is meant: a luminance that differs by 2 % looks the same.
 KEY_SIGMA = 0.02
 #: Light at all keys, over the strongest, below which a design near another keeps its albedo.
 FAINT = 0.01
 #: Bands lit in proportion whose names are all written.
-MOST_JOINED = 3
+MAX_JOINED = 3
 #: Factor within its range from which a rate is not held by an end of it.
 INSIDE = 1.01
 #: Keys above which it is not asked which work against each other.
-MOST_COMPARED = 60
+MAX_COMPARED = 60
 
 
 def solve(
@@ -184,8 +184,8 @@ def _check(
 ) -> None:
     if not keys.count:
         raise UsageError("expected at least one key, got none; say when it should glow how")
-    if not 1 <= n_states <= MOST_STATES:
-        raise UsageError(f"expected 1 or {MOST_STATES} states, got {n_states}")
+    if not 1 <= n_states <= MAX_STATES:
+        raise UsageError(f"expected 1 or {MAX_STATES} states, got {n_states}")
     if order is not None and not 1 <= order <= MAX_ORDER:
         raise UsageError(f"expected a kinetic order from 1 to {MAX_ORDER:g}, got {order:g}")
     if not 0 < key_sigma < 1:
@@ -242,7 +242,7 @@ def _judged(
         *_linear(coefficients, _by_band(sigma[n_nonlinear:], len(blocks), bands), bands),
     ]
     fights: tuple[Conflict, ...] = ()
-    if problem.n_keys <= MOST_COMPARED:
+    if problem.n_keys <= MAX_COMPARED:
         key_of_row = np.tile(np.arange(problem.n_keys), n_rows // problem.n_keys)
         fights = conflicts(residuals, jacobian[:, np.concatenate(is_free)], key_of_row)
     return tuple(estimates), fights
@@ -276,7 +276,7 @@ def _rates(
 
 def _joined(names: Sequence[str]) -> str:
     """Return the names of bands, of many the first and the last."""
-    many = len(names) > MOST_JOINED
+    many = len(names) > MAX_JOINED
     return f"{names[0]} … {names[-1]}" if many else " + ".join(names)
 
 

@@ -129,9 +129,9 @@ HELD, FIXED = 1e-3, 1e3
 #: What is emitted over what is absorbed from which on it is nearly all.
 NEARLY_ALL = 0.9
 #: Materials of dots that are kept from one wish to the next.
-MOST_KEPT = 64
+MAX_KEPT = 64
 #: Largest albedo of a texel: light has to be lost at every bounce.
-MOST_ALBEDO = 0.99
+MAX_ALBEDO = 0.99
 
 
 @dataclass(frozen=True, eq=False)
@@ -461,7 +461,7 @@ class Spreading:
         key = (wish.file.states, wish.file.weights, wish.file.key_sigma, wish.file.bands_nm, given,
                *(each.tobytes() for each in arrays))  # fmt: skip
         if key not in self._found:
-            if len(self._found) >= MOST_KEPT:
+            if len(self._found) >= MAX_KEPT:
                 self._found.pop(next(iter(self._found)))
             self._found[key] = wish.solve("kept", programme, keys=keys, albedo=albedo)
         return self._found[key]
@@ -544,7 +544,7 @@ def _own_albedo(
     if not (all(known) and squared > 0):
         return base.albedo
     factor = float(free.albedo @ base.albedo) / squared
-    return base.albedo * min(factor, MOST_ALBEDO / float(base.albedo.max()))
+    return base.albedo * min(factor, MAX_ALBEDO / float(base.albedo.max()))
 
 
 def _blended(

@@ -16,7 +16,7 @@ from labrig.design.light import LightProgramme
 from labrig.design.propagation import SpreadWish
 from labrig.design.result import Design
 from labrig.design.search import PREFERENCE
-from labrig.design.solver import KEY_SIGMA, MOST_STATES, solve
+from labrig.design.solver import KEY_SIGMA, MAX_STATES, solve
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive, UnitFraction
@@ -186,7 +186,7 @@ class WishFile(FrozenModel):
 
     name: Annotated[str, Field(min_length=1)] = "design"
     bands_nm: tuple[Positive, ...] | None = None
-    states: Annotated[int, Field(ge=1, le=MOST_STATES)] = 1
+    states: Annotated[int, Field(ge=1, le=MAX_STATES)] = 1
     order: Annotated[float, Field(ge=1, le=MAX_ORDER)] | Literal["free"] = 1.0
     albedo: UnitFraction | tuple[UnitFraction, ...] | Literal["free"] = "free"
     weights: Literal["luminance", "plain"] = "luminance"

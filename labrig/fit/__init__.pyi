@@ -1,6 +1,6 @@
 from .bispectral import (
     BispectralColumns as BispectralColumns,
-    LitSpectrum as LitSpectrum,
+    IlluminatedSpectrum as IlluminatedSpectrum,
     SeparatedColumns as SeparatedColumns,
     bispectral_columns as bispectral_columns,
     separate_columns as separate_columns,

@@ -223,7 +223,7 @@ def _scatter(design: FloatArray, value: FloatArray, noise: FloatArray, dof: int)
 
 
 #: Angles beyond which texture and penumbra count for more than the law: cosines of incidence, view.
-LEAST_INCIDENCE, LEAST_VIEW = 0.35, 0.4
+MIN_INCIDENCE, MIN_VIEW = 0.35, 0.4
 #: Relative uncertainty of the light's distance.
 DISTANCE_SIGMA = 0.02
 #: Uncertainty of the outline's centre and radius that all views share, in radii, beside that of
@@ -421,7 +421,7 @@ class _View:
         """Return the places that are lit and seen well."""
         cos_incidence, falloff = incidence(image.normal, light)
         cos_view = image.normal[:, 2]
-        used = (cos_incidence > LEAST_INCIDENCE) & (cos_view > LEAST_VIEW) & (image.radiance > 0)
+        used = (cos_incidence > MIN_INCIDENCE) & (cos_view > MIN_VIEW) & (image.radiance > 0)
         if used.sum() < 50:
             raise DataError(
                 f"expected a sphere of which much is lit, got {used.sum()} usable places; correct "
@@ -581,7 +581,7 @@ def _combined(by_scatter: float, by_shared: float, views: int) -> tuple[float, f
 
 def _binned(views: Sequence[_View], roughness_rad: float) -> dict[str, FloatArray]:
     """Return cosines, radiances, their scatter, and the model in bins of the cosine."""
-    edges = np.linspace(LEAST_INCIDENCE, 1.0, _BINS + 1)
+    edges = np.linspace(MIN_INCIDENCE, 1.0, _BINS + 1)
     columns = []
     for view in views:
         bins = np.clip(np.digitize(view.cos_incidence, edges) - 1, 0, _BINS - 1)

@@ -29,11 +29,11 @@ WINDOW_LEVEL, WINDOW_ROOM = 0.02, 0.5
 #: Pixels over which noise is averaged when the window is looked for.
 SMOOTHED_PIXELS = 9
 #: A light's peak over its σ, below which there is no light.
-LEAST_PEAK = 20.0
+MIN_PEAK = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class LitSpectrum:
+class IlluminatedSpectrum:
     """Light from a surface, above the dark, in the scale of all spectra that belong together.
 
     Attributes
@@ -54,15 +54,17 @@ class LitSpectrum:
     common_sigma: FloatArray | None = None
 
     @classmethod
-    def of(cls, spectrum: Spectrum) -> "LitSpectrum":
+    def of(cls, spectrum: Spectrum) -> "IlluminatedSpectrum":
         """Return a spectrum whose values have independent errors, or none that are known."""
         sigma = np.zeros_like(spectrum.value) if spectrum.sigma is None else spectrum.sigma
         return cls(spectrum.wavelength_nm, spectrum.value, sigma)
 
-    def divided_by(self, factor: FloatArray) -> "LitSpectrum":
+    def divided_by(self, factor: FloatArray) -> "IlluminatedSpectrum":
         """Return the spectrum over an exact factor (p,), such as the reflectance of a white."""
         common = None if self.common_sigma is None else self.common_sigma / factor
-        return LitSpectrum(self.wavelength_nm, self.value / factor, self.sigma / factor, common)
+        return IlluminatedSpectrum(
+            self.wavelength_nm, self.value / factor, self.sigma / factor, common
+        )
 
     def integrated(self, weights_nm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the integrals with weights of shape (k, p), and their σ, shape (k,)."""
@@ -120,8 +122,8 @@ class BispectralColumns:
 
 
 def bispectral_columns(
-    lights: Sequence[LitSpectrum],
-    samples: Sequence[LitSpectrum],
+    lights: Sequence[IlluminatedSpectrum],
+    samples: Sequence[IlluminatedSpectrum],
     output_nm: FloatArray,
     scale_sigma: FloatArray | None = None,
     light_sigma: FloatArray | None = None,
@@ -159,11 +161,12 @@ def bispectral_columns(
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.fit import LitSpectrum, bispectral_columns
+    >>> from labrig.fit import IlluminatedSpectrum, bispectral_columns
     >>> nm = np.arange(380.0, 781.0, 2.0)
     >>> blue, noise = np.exp(-(((nm - 450) / 12) ** 2)), np.full(len(nm), 1e-4)
     >>> green = np.exp(-(((nm - 540) / 30) ** 2))
-    >>> white, cloth = (LitSpectrum(nm, light, noise) for light in (blue, 0.3 * blue + 0.1 * green))
+    >>> lit = (blue, 0.3 * blue + 0.1 * green)
+    >>> white, cloth = (IlluminatedSpectrum(nm, light, noise) for light in lit)
     >>> columns = bispectral_columns([white], [cloth], np.array([450.0, 540.0]))
     >>> [round(float(value), 2) for value in columns.column[:, 0]]
     [0.3, 0.24]
@@ -207,7 +210,7 @@ def bispectral_columns(
     )
 
 
-def light_window_nm(light: LitSpectrum) -> tuple[float, float]:
+def light_window_nm(light: IlluminatedSpectrum) -> tuple[float, float]:
     """Return the ends of the range in nm about the strongest peak of a light that holds its power.
 
     Raises
@@ -220,8 +223,8 @@ def light_window_nm(light: LitSpectrum) -> tuple[float, float]:
     smooth = np.convolve(light.value, np.full(pixels, 1 / pixels), mode="same")
     noise = np.sqrt(np.convolve(light.sigma**2, np.full(pixels, 1 / pixels**2), mode="same"))
     # At the ends of its range a detector sees little: what is divided there is noise.
-    peak = int(np.argmax(np.where(smooth > LEAST_PEAK * noise, smooth, -np.inf)))
-    if not smooth[peak] > LEAST_PEAK * noise[peak]:
+    peak = int(np.argmax(np.where(smooth > MIN_PEAK * noise, smooth, -np.inf)))
+    if not smooth[peak] > MIN_PEAK * noise[peak]:
         raise DataError("expected light on the white reference, got none above the noise")
     is_lit = smooth > WINDOW_LEVEL * smooth[peak]
     below = np.flatnonzero(~is_lit[:peak])
@@ -277,7 +280,10 @@ class _Column:
 
 
 def _column(
-    light: LitSpectrum, sample: LitSpectrum, window_nm: tuple[float, float], edges_nm: FloatArray
+    light: IlluminatedSpectrum,
+    sample: IlluminatedSpectrum,
+    window_nm: tuple[float, float],
+    edges_nm: FloatArray,
 ) -> _Column:
     bands = band_weights_nm(light.wavelength_nm, edges_nm)
     window = band_weights_nm(light.wavelength_nm, np.array(window_nm))
@@ -315,7 +321,7 @@ def _scale_variance(share: FloatArray, scale_sigma: FloatArray) -> FloatArray:
 
 
 #: Least part of a light in a band from which its reflectance is read.
-LEAST_SHARE = 0.03
+MIN_SHARE = 0.03
 #: Part of a light in a band from which reflected light is more than a correction.
 MIXED_SHARE = 1e-3
 #: Mean and σ of a reflectance of which nothing is known, even between 0 and 1; and the part of a
@@ -368,11 +374,12 @@ def separate_columns(columns: BispectralColumns) -> SeparatedColumns:
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.fit import LitSpectrum, bispectral_columns, separate_columns
+    >>> from labrig.fit import IlluminatedSpectrum, bispectral_columns, separate_columns
     >>> nm = np.arange(380.0, 781.0, 2.0)
     >>> blue, noise = np.exp(-(((nm - 450) / 12) ** 2)), np.full(len(nm), 1e-4)
     >>> green = np.exp(-(((nm - 540) / 30) ** 2))
-    >>> white, cloth = (LitSpectrum(nm, light, noise) for light in (blue, 0.3 * blue + 0.1 * green))
+    >>> lit = (blue, 0.3 * blue + 0.1 * green)
+    >>> white, cloth = (IlluminatedSpectrum(nm, light, noise) for light in lit)
     >>> columns = bispectral_columns([white], [cloth], np.arange(430.0, 600.0, 20.0))
     >>> separated = separate_columns(columns)
     >>> separated.is_mixed[:3, 0].tolist()
@@ -383,7 +390,7 @@ def separate_columns(columns: BispectralColumns) -> SeparatedColumns:
     share, column = columns.share, columns.column
     is_mixed = share >= np.maximum(MIXED_SHARE, 3 * columns.share_sigma)
     own = _own_reradiation(columns, is_mixed)
-    is_read = share >= LEAST_SHARE
+    is_read = share >= MIN_SHARE
     part = np.where(is_read, share, 1.0)
     ratio = np.where(is_read, (column - own / 2) / part, np.nan)
     relative = np.hypot(columns.column_sigma, ratio * columns.share_sigma) / part

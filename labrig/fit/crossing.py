@@ -159,13 +159,13 @@ def _line(
 
 
 #: Most values, evenly spaced in ln t, and the fewest that a law is fitted to.
-MOST_VALUES, FEWEST_VALUES = 32, 5
+MAX_VALUES, MIN_VALUES = 32, 5
 #: Rates of the reference: lowest in inverse last times, highest in inverse first times, number.
 LOWEST_RATE, HIGHEST_RATE, N_RATES = 0.02, 8.0, 40
 #: Least luminance of the reference, relative to its largest, and least slope −d ln L/d ln t.
-LEAST_REFERENCE, LEAST_SLOPE = 1e-9, 0.05
+MIN_REFERENCE, MIN_SLOPE = 1e-9, 0.05
 #: Relative σ that the search for the scatter begins with, the least, and the number of its steps.
-BEGIN_SCATTER, LEAST_SCATTER, SCATTER_STEPS = 0.02, 1e-5, 4
+BEGIN_SCATTER, MIN_SCATTER, SCATTER_STEPS = 0.02, 1e-5, 4
 #: Parameters of a reference, which follow the readings.
 REFERENCE_PARAMETERS = 4
 #: Degrees of freedom of differences of neighbours per reading, and σ of their mean square from
@@ -206,25 +206,25 @@ class LogDecay:
         x = np.log(t_s)
         reference, slope = _reference(x, light, sigma)
         weights = np.square(reference / sigma)
-        edges = np.linspace(x[0], x[-1], MOST_VALUES + 1)[1:-1]
+        edges = np.linspace(x[0], x[-1], MAX_VALUES + 1)[1:-1]
         place = np.searchsorted(edges, x, side="right")
         # What falls below nothing has no logarithm.
-        sums = np.bincount(place, weights * light / reference, MOST_VALUES)
+        sums = np.bincount(place, weights * light / reference, MAX_VALUES)
         used = np.flatnonzero(sums > 0)
-        if len(used) < FEWEST_VALUES:
+        if len(used) < MIN_VALUES:
             raise FitError(
-                f"expected means above zero at {FEWEST_VALUES} times or more, got {len(used)}"
+                f"expected means above zero at {MIN_VALUES} times or more, got {len(used)}"
             )
-        totals = np.bincount(place, weights, MOST_VALUES)[used]
+        totals = np.bincount(place, weights, MAX_VALUES)[used]
 
         def mean(values: FloatArray) -> FloatArray:
-            return np.asarray(np.bincount(place, weights * values, MOST_VALUES)[used] / totals)
+            return np.asarray(np.bincount(place, weights * values, MAX_VALUES)[used] / totals)
 
         return cls(
             mean(x),
             np.log(sums[used] / totals) + mean(np.log(reference)),
             1 / np.sqrt(totals),
-            np.maximum(mean(slope), LEAST_SLOPE),
+            np.maximum(mean(slope), MIN_SLOPE),
         )
 
 
@@ -245,7 +245,7 @@ def reading_sigma(t_s: FloatArray, light: FloatArray, sigma: FloatArray | None) 
         variances = nonnegative_least_squares(
             (parts / expected).T, np.square(difference) / expected
         )
-        relative = max(float(variances[0]), LEAST_SCATTER**2)
+        relative = max(float(variances[0]), MIN_SCATTER**2)
         scatter = np.sqrt(relative * np.square(reference) + variances[1])
     # Parameters of the reference follow the readings.
     followed = math.sqrt(len(x) / max(len(x) - REFERENCE_PARAMETERS, 1))
@@ -261,7 +261,7 @@ def _reference(
     decays = np.exp(-np.multiply.outer(t_s, rates))
     amplitudes = nonnegative_least_squares(decays / sigma[:, None], light / sigma)
     value = decays @ amplitudes
-    value = np.maximum(value, LEAST_REFERENCE * float(value.max()))
+    value = np.maximum(value, MIN_REFERENCE * float(value.max()))
     return value, t_s * (decays @ (amplitudes * rates)) / value
 
 
@@ -399,9 +399,9 @@ WALKS = (0.03, 0.1, 0.25)
 FIRST_PARTS = (0.5, 0.75)
 #: Steps of the fits, first damping, its factors after a good and a bad step, and its limits.
 N_STEPS, DAMPING, BETTER, WORSE = 24, 1e-2, 0.2, 6.0
-LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e9
+MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 #: Change of a parameter, in its prior's σ, for slopes; largest change in a step.
-SLOPE_STEP, LARGEST_STEP = 1e-5, 1.0
+SLOPE_STEP, MAX_STEP = 1e-5, 1.0
 #: Degrees of freedom of the distributions of draws and of predictions.
 STUDENT_FREEDOM = 6.0
 
@@ -474,7 +474,7 @@ def posteriors(decay: LogDecay, laws: tuple[Candidate, ...]) -> list[Posterior]:
     x, n = decay.log_time, len(decay.log_time)
     fractions = (x - x[0]) / (x[-1] - x[0])
     counts = {int(np.searchsorted(fractions, part, side="right")) for part in FIRST_PARTS}
-    first = sorted(count for count in counts if FEWEST_VALUES <= count < n)
+    first = sorted(count for count in counts if MIN_VALUES <= count < n)
     problems = [(delta, count) for delta in WALKS for count in (*first, n)]
     whitening = np.stack([_whitening(decay, *problem) for problem in problems])
     result = []
@@ -571,11 +571,11 @@ def _fits(
             damped = information + (damping[:, None] * diagonal)[:, :, None] * np.eye(p)
             step = -np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
             large = (np.abs(step) / law.sigma).max(axis=1, keepdims=True)
-            step *= np.minimum(1.0, LARGEST_STEP / np.maximum(large, LARGEST_STEP))
+            step *= np.minimum(1.0, MAX_STEP / np.maximum(large, MAX_STEP))
             trial = at(theta + step)
             is_better = (trial[0] <= chi2) & np.isfinite(trial[2]).all(axis=(1, 2))
             damping = np.where(is_better, damping * BETTER, damping * WORSE)
-            damping = np.clip(damping, LEAST_DAMPING, MOST_DAMPING)
+            damping = np.clip(damping, MIN_DAMPING, MAX_DAMPING)
             now = (
                 np.where(is_better, trial[0], chi2),
                 np.where(is_better[:, None], trial[1], gradient),
@@ -590,7 +590,7 @@ def _fits(
 #: Part of the draws of what the record does not foretell.
 UNFORESEEN = 0.15
 #: Number of draws, and least weight of a law that is drawn from.
-N_DRAWS, LEAST_WEIGHT = 2000, 2e-3
+N_DRAWS, MIN_WEIGHT = 2000, 2e-3
 #: Probability on each side of the range.
 OUTSIDE = 0.025
 #: Ratio of its ends from which a time is not determined.
@@ -674,7 +674,7 @@ def _weights(every: list[Posterior]) -> FloatArray:
     weights = np.exp(logs - logs.max())
     unforeseen = np.array([float(posterior.delta == max(WALKS)) for posterior in every])
     weights = (1 - UNFORESEEN) * weights / weights.sum() + UNFORESEEN * unforeseen / sum(unforeseen)
-    weights[weights < LEAST_WEIGHT] = 0.0
+    weights[weights < MIN_WEIGHT] = 0.0
     return np.asarray(weights / weights.sum())
 
 

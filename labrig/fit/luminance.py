@@ -32,14 +32,14 @@ from labrig.results import (
 
 UNIT = "mcd/m²"
 #: Fewest readings of a parabola, where their σ is known and where their scatter tells it.
-FEWEST, FEWEST_WITHOUT_SIGMA = 5, 8
+FEWEST, MIN_WITHOUT_SIGMA = 5, 8
 #: Range of ln t of a parabola to each side, at least, and at most where readings are few.
 NEAR, FAR = math.log(1.5), math.log(8.0)
 #: Significance from which the end falls too slowly, the factor in time between the luminances that
 #: tell it, and the luminance below which a meter's zero may do that.
 SLOWER_SIGMAS, EARLIER, DIM_MCD_PER_M2 = 4.0, 4.0, 3.0
 #: Slope of ln L in ln t from which a time has an error of its own.
-LEAST_SLOPE = 1e-3
+MIN_SLOPE = 1e-3
 #: σ of normal errors over the median of their sizes.
 MEDIAN_TO_SIGMA = 1.4826
 #: Probability of χ² below which a parabola misses the readings.
@@ -147,7 +147,7 @@ class _Readings:
     ) -> "_Readings":
         t, light = np.asarray(t_s, np.float64), np.asarray(value, np.float64)
         known = None if sigma is None else np.broadcast_to(np.asarray(sigma, np.float64), t.shape)
-        fewest = FEWEST_WITHOUT_SIGMA if known is None else FEWEST
+        fewest = MIN_WITHOUT_SIGMA if known is None else FEWEST
         if len(t) < fewest:
             raise FitError(f"expected {fewest} readings or more, got {len(t)}")
         if not (np.isfinite(light).all() and t[0] > 0 and (np.diff(t) > 0).all()):
@@ -168,7 +168,7 @@ class _Readings:
     def parabola(self, at_s: float, *, at_end: bool = False) -> _Parabola | None:
         """Fit the readings around a time; None if there are none around it."""
         x = np.log(self.t_s / at_s)
-        fewest = FEWEST_WITHOUT_SIGMA if self.sigma is None else FEWEST
+        fewest = MIN_WITHOUT_SIGMA if self.sigma is None else FEWEST
         width = max(NEAR, float(np.sort(np.abs(x))[fewest - 1]))
         used = np.abs(x) <= width
         x, light = x[used], self.value[used]
@@ -226,7 +226,7 @@ class _Readings:
         found = self.parabola(t)
         assert found is not None
         relative = math.hypot(found.relative_sigma, self.common(t))
-        return Measured(t, t * relative / max(-found.slope, LEAST_SLOPE), "s")
+        return Measured(t, t * relative / max(-found.slope, MIN_SLOPE), "s")
 
     def slope_between(self, early_s: float, late_s: float) -> Measured | None:
         """Return −d ln L/d ln t between two times; what the scale has in common cancels."""

@@ -94,7 +94,7 @@ class Ending(Enum):
     #: data, or the search was lost on a plateau.
     RANK_DEFICIENT = "rank deficient"
     #: Still descending, along a flat valley or for want of evaluations.
-    CREEPING = "creeping"
+    SLOW_PROGRESS = "creeping"
 
 
 @dataclass(frozen=True)
@@ -289,7 +289,7 @@ def _fit_from(
         point, ending = _polish(problem, point, tolerance)
         evaluations += spent
         gains = spent == limit or search_step > 0 or point.chi2 < before * (1 - NO_GAIN)
-        goes_on = ending is Ending.CREEPING and gains and not is_compared
+        goes_on = ending is Ending.SLOW_PROGRESS and gains and not is_compared
         if not goes_on or evaluations >= max_iterations:
             return _End(point, ending, evaluations)
         # Along a flat, curved valley damped steps are short long before its lowest place.
@@ -526,7 +526,7 @@ def _polish(problem: _Problem, point: _Point, tolerance: float) -> tuple[_Point,
     Where residuals are large the steps shrink by a constant factor, alternating, hence the
     patience.
     """
-    least, idle, ending = np.inf, 0, Ending.CREEPING
+    least, idle, ending = np.inf, 0, Ending.SLOW_PROGRESS
     for _ in range(POLISH_STEPS):
         free = problem.free(point)
         if not free.any():
@@ -542,7 +542,7 @@ def _polish(problem: _Problem, point: _Point, tolerance: float) -> tuple[_Point,
             ending = Ending.RANK_DEFICIENT
         else:
             is_still = along @ along < CONVERGED_GAIN * point.chi2 or least < ROUNDED_STEP
-            ending = Ending.MINIMUM if least < CONVERGED_STEP and is_still else Ending.CREEPING
+            ending = Ending.MINIMUM if least < CONVERGED_STEP and is_still else Ending.SLOW_PROGRESS
         if idle == POLISH_PATIENCE or size < max(tolerance, EPSILON):
             break
         trial = problem.at(problem.nearest(point.x + step))
@@ -596,7 +596,7 @@ def _result(problem: _Problem, end: _End) -> LeastSquaresFit:
         at_bound=~problem.free(point),
         iterations=end.evaluations,
         ending=end.ending,
-        creeps=end.ending is Ending.CREEPING and _gains_by_a_step(problem, point),
+        creeps=end.ending is Ending.SLOW_PROGRESS and _gains_by_a_step(problem, point),
     )
 
 

@@ -119,16 +119,16 @@ SIGMAS = (1.0, NORMAL_95)
 STIFFNESS = 30.0
 #: Steps of a search for a limit, relative precision of √Δχ² at its end, largest ratio of a step to
 #: the way made so far, and part of that way by which a step aims beyond.
-MOST_POINTS, PRECISION, LONGEST_STEP, BEYOND = 25, 3e-3, 2.0, 0.03
+MAX_POINTS, PRECISION, MAX_STEP, BEYOND = 25, 3e-3, 2.0, 0.03
 #: Relative step and gain in χ² at which a point of the profile is near enough, and its evaluations.
-TOLERANCE, LEAST_GAIN, MAX_ITERATIONS = 1e-4, 1e-4, 200
+TOLERANCE, MIN_GAIN, MAX_ITERATIONS = 1e-4, 1e-4, 200
 #: Part of a quantity's σ within which it is at the end of its range, and of a step below which a
 #: parameter's bound has stopped it.
 AT_END, STOPPED = 0.01, 0.1
 #: Largest σ that a search goes by, as a part of the range searched.
 PART_OF_RANGE = 0.2
 #: Largest number with an exponential.
-LARGEST_LOG = 700.0
+MAX_LOG = 700.0
 #: Gain in χ² over the fit from which it was not at the minimum.
 LOWER_MINIMUM = 0.01
 
@@ -160,7 +160,7 @@ class Quantity:
 
 def exponential(value: float) -> float:
     """Return e^x, infinite beyond what a number holds."""
-    return math.exp(value) if value < LARGEST_LOG else math.inf
+    return math.exp(value) if value < MAX_LOG else math.inf
 
 
 def parameter(number: int) -> Value:
@@ -401,7 +401,7 @@ class _Way:
             pull = max(float(fit.residuals @ (fit.jacobian @ step)), 0.0)
             return factor * away_from_bound(pull / factor, sigmas)
         is_bound = end in (least, largest)
-        if not is_bound or abs(end - value) > 2 * sigmas * factor * sigma * LONGEST_STEP:
+        if not is_bound or abs(end - value) > 2 * sigmas * factor * sigma * MAX_STEP:
             return factor * sigmas
         at_end = next((point for point in points if point.target == end), None)
         if at_end is None:
@@ -443,13 +443,13 @@ class _Way:
     def _reaches(self, points: list[_Point], end: float, root: float) -> bool:
         """Return whether the profile reaches a root of Δχ², after points on the way there."""
         lengthened = 1.0
-        for _ in range(MOST_POINTS):
+        for _ in range(MAX_POINTS):
             last = max(points, key=lambda point: self.side * point.target)
             if max(point.root for point in points) >= root:
                 return True
             way, wanted = self.side * (last.target - points[0].target), root * self._sigma
             if last.root > 0:
-                wanted = way * min(lengthened * (root / last.root - 1) + BEYOND, LONGEST_STEP)
+                wanted = way * min(lengthened * (root / last.root - 1) + BEYOND, MAX_STEP)
             step = min(wanted, self.side * (end - last.target))
             if step < AT_END * min(wanted, self._sigma):
                 return False
@@ -458,7 +458,7 @@ class _Way:
             # A value that a parameter's bound stops moves no further.
             if not self.side * (new.value - last.value) > STOPPED * step:
                 return new.root >= root
-            lengthened *= LONGEST_STEP
+            lengthened *= MAX_STEP
         return False
 
     def _point(self, target: float, near: _Point) -> _Point:
@@ -491,7 +491,7 @@ class _Way:
             upper=upper,
             max_iterations=MAX_ITERATIONS,
             tolerance=TOLERANCE,
-            least_gain=LEAST_GAIN,
+            least_gain=MIN_GAIN,
         )
         chi2 = fit.chi2 - float(fit.residuals[-1]) ** 2
         delta = chi2 - likelihood.fit.chi2

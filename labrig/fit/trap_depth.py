@@ -11,7 +11,7 @@ from labrig.foundation.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
 from labrig.results import Measured, TrapDepth
 
 #: Span of the temperatures that tells a depth, in K.
-LEAST_SPAN_K = 2.0
+MIN_SPAN_K = 2.0
 #: Probability of χ² below which one depth does not describe the rates.
 MISSED = 0.01
 #: Frequency factors that lattices have, in 1/s: those of their phonons, and some orders below.
@@ -82,9 +82,9 @@ def fit_trap_depth(
             f"expected rates and σ above 0, got {rate[place]:g} ± {sigma[place]:g} 1/s at "
             f"{celsius[place]:g} °C; leave that one out"
         )
-    if np.ptp(celsius) < LEAST_SPAN_K:
+    if np.ptp(celsius) < MIN_SPAN_K:
         raise FitError(
-            f"expected temperatures that differ by {LEAST_SPAN_K:g} K or more, got "
+            f"expected temperatures that differ by {MIN_SPAN_K:g} K or more, got "
             f"{celsius[0]:.1f} °C to {celsius[-1]:.1f} °C; heat or cool the sample"
         )
     kelvin = celsius + ZERO_C_K

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: Smallest value written without a power of ten.
-SMALLEST_PLAIN = 1e-3
+MIN_PLAIN = 1e-3
 #: Values from here on are written with a power of ten.
-LARGEST_PLAIN = 1e6
+MAX_PLAIN = 1e6
 
 #: Exposure times below this are written as fractions.
-LONGEST_FRACTION_S = 0.3
+MAX_FRACTION_S = 0.3
 
 
 def plus_minus(value: float, sigma: float) -> str:
@@ -25,7 +25,7 @@ def plus_minus(value: float, sigma: float) -> str:
     if not math.isfinite(sigma):
         return f"{rounded(value, 3)} ± ?"
     exponent = _exponent(max(abs(value), sigma))
-    plain = SMALLEST_PLAIN <= 10.0**exponent < LARGEST_PLAIN
+    plain = MIN_PLAIN <= 10.0**exponent < MAX_PLAIN
     scale = 1.0 if plain else 10.0**exponent
     decimals = 1 - _exponent(float(f"{sigma / scale:.1e}"))
     places = max(decimals, 0)
@@ -41,7 +41,7 @@ def rounded(value: float, digits: int = 4) -> str:
     if value == 0:
         return "0"
     exponent = _exponent(float(f"{value:.{digits - 1}e}"))
-    if SMALLEST_PLAIN <= 10.0**exponent < LARGEST_PLAIN:
+    if MIN_PLAIN <= 10.0**exponent < MAX_PLAIN:
         decimals = digits - 1 - exponent
         text = f"{round(value, decimals):.{max(decimals, 0)}f}"
         text = text.rstrip("0").rstrip(".") if "." in text else text
@@ -61,7 +61,7 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 def exposure_text(exposure_s: float) -> str:
     """Format an exposure time, such as `1/64 s`, `0.5 s` or `30 s`."""
-    if 0 < exposure_s < LONGEST_FRACTION_S:
+    if 0 < exposure_s < MAX_FRACTION_S:
         return f"1/{1 / exposure_s:.0f} s"
     return f"{rounded(exposure_s, 3)} s"
 

@@ -15,7 +15,7 @@ SLACK = 1e-3
 #: Largest length of a text quoted in a message.
 MAX_SHOWN = 80
 #: Number of pixels below which the noise of a region cannot be told from its structure.
-LEAST_PIXELS = 100
+MIN_PIXELS = 100
 _EXPECTED = "expected four numbers x, y, width, height, in pixels or all as fractions of the frame"
 Corner = Annotated[float, Field(ge=0, le=MAX_PIXELS)]
 Extent = Annotated[float, Field(gt=0, le=MAX_PIXELS)]

@@ -32,7 +32,7 @@ _UNITS_NM = {"nanometers": 1.0, "nanometer": 1.0, "nm": 1.0, "micrometers": 1e3,
 #: Endings of the file of numbers beside a header, in the order in which they are tried.
 _BESIDE = ("", ".raw", ".img", ".dat", ".bsq", ".bil", ".bip")
 #: Largest number of values, so that a wrong header does not fill the memory.
-MOST_VALUES = 2_000_000_000
+MAX_VALUES = 2_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +188,8 @@ def _read_envi(path: Path) -> tuple[FloatArray, NDArray[Any]]:
     if min(size.values()) < 1 or offset < 0:
         raise ValueError(f"lines, samples and bands must be 1 or more, got {size}")
     number = size["l"] * size["s"] * size["b"]
-    if number > MOST_VALUES:
-        raise ValueError(f"{number} values are more than the {MOST_VALUES} that are read")
+    if number > MAX_VALUES:
+        raise ValueError(f"{number} values are more than the {MAX_VALUES} that are read")
     kind, interleave = header["data type"], header["interleave"].lower()
     if kind not in _TYPES or interleave not in _AXES:
         raise ValueError(

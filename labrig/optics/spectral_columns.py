@@ -223,9 +223,9 @@ class Ordinate:
             The values may be fractions as well as per cent, or are no absorbances.
         """
         if self.form is _Form.ABSORBANCE:
-            if np.abs(values * self.factor).max() > _LARGEST_ABSORBANCE:
+            if np.abs(values * self.factor).max() > _MAX_ABSORBANCE:
                 raise ValueError(
-                    f"expected absorbances up to {_LARGEST_ABSORBANCE:g}, got "
+                    f"expected absorbances up to {_MAX_ABSORBANCE:g}, got "
                     f"{np.abs(values * self.factor).max():g}"
                 )
             fraction = 10.0 ** -(values * self.factor)
@@ -257,7 +257,7 @@ class Ordinate:
 
 
 #: Absorbance that no instrument measures.
-_LARGEST_ABSORBANCE = 20.0
+_MAX_ABSORBANCE = 20.0
 UNKNOWN = Ordinate(Quantity.UNKNOWN)
 
 _REFUSED = {

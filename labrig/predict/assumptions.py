@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from labrig.acquire import CameraOffers, ProtocolModel
+from labrig.acquire import CameraCapabilities, ProtocolModel
 from labrig.foundation import resources
 from labrig.foundation.errors import UsageError
 from labrig.foundation.quantity import TIME_S, parse
@@ -90,7 +90,7 @@ def _charge_s(protocol: DecaySettings) -> float:
 
 
 def brightness_metered_as(
-    metered: DecaySettings, offers: CameraOffers, bench: Bench, exposure_s: float
+    metered: DecaySettings, capabilities: CameraCapabilities, bench: Bench, exposure_s: float
 ) -> float:
     """Return the factor for the glows with which metering chooses a given first exposure.
 
@@ -98,7 +98,7 @@ def brightness_metered_as(
     ----------
     classify_ladder
         Protocol with `exposure: auto`.
-    offers
+    capabilities
         Settings that the camera offers.
     bench
         Bench with the glows to be scaled.
@@ -106,7 +106,7 @@ def brightness_metered_as(
         First exposure time in seconds; if the time between frames does not allow it, the glow is
         dimmer in proportion.
     """
-    reached_s = min(exposure_s, metered.longest_exposure_s(offers))
+    reached_s = min(exposure_s, metered.longest_exposure_s(capabilities))
     metered_bench = bench.at_settings(metered.camera)
     low, high = np.log(DIMMEST), np.log(BRIGHTEST)
     for _ in range(BISECTIONS):
@@ -115,7 +115,7 @@ def brightness_metered_as(
             patch: glow.brighter(np.exp(middle)) for patch, glow in metered_bench.glows.items()
         }
         trial_bench = Bench(metered_bench.camera, metered_bench.flicker, brighter)
-        schedule = expected_schedule(metered, offers, trial_bench, lambda _: None)
+        schedule = expected_schedule(metered, capabilities, trial_bench, lambda _: None)
         low, high = (
             (middle, high) if schedule.exposures_s[0] >= 0.999 * reached_s else (low, middle)
         )
@@ -212,7 +212,7 @@ class Assumptions:
 
 
 def collect_assumptions(
-    model: ProtocolModel, offers: CameraOffers, sources: Sources
+    model: ProtocolModel, capabilities: CameraCapabilities, sources: Sources
 ) -> Assumptions:
     """Return camera, flicker and glows, from earlier runs or else typical ones.
 
@@ -229,7 +229,9 @@ def collect_assumptions(
     like = None if sources.like is None else _read_like(sources.like, next(iter(files)))
     own_runs = {patch: _own_run(name, materials[patch], like) for patch, name in files.items()}
     reference = like or next((run for run in own_runs.values() if run is not None), None)
-    camera = typical_camera(offers, protocol.camera.iso) if reference is None else reference.camera
+    camera = (
+        typical_camera(capabilities, protocol.camera.iso) if reference is None else reference.camera
+    )
     flicker = None if reference is None else reference.flicker
     measured = {
         patch: glow
@@ -244,7 +246,7 @@ def collect_assumptions(
     bench = Bench(camera, flicker or TYPICAL_FLICKER, {**measured, **relative})
     notes = [_camera_note(camera, reference), _flicker_note(flicker)]
     if relative:
-        factor, note = _brightness(model, offers, bench, measured, relative, sources)
+        factor, note = _brightness(model, capabilities, bench, measured, relative, sources)
         brighter = {patch: glow.brighter(factor) for patch, glow in relative.items()}
         bench = replace(bench, glows={**measured, **brighter})
         notes.append(note)
@@ -293,7 +295,7 @@ def _own_run(name: str, material: Material, like: Reference | None) -> Reference
 
 def _brightness(
     model: ProtocolModel,
-    offers: CameraOffers,
+    capabilities: CameraCapabilities,
     bench: Bench,
     measured: Mapping[str, Glow],
     relative: Mapping[str, Glow],
@@ -308,11 +310,11 @@ def _brightness(
     if exposure_s is None and isinstance(protocol.exposure, float):
         exposure_s, reason = protocol.exposure, "assumed, as suits the protocol's exposure"
     elif exposure_s is None:
-        longest_s = protocol.longest_exposure_s(offers)
-        exposure_s = offers.exposure_at_most(longest_s * FIRST_EXPOSURE_FRACTION)
+        longest_s = protocol.longest_exposure_s(capabilities)
+        exposure_s = capabilities.exposure_at_most(longest_s * FIRST_EXPOSURE_FRACTION)
         reason = "assumed; say --metered"
     metered = predictable(changed(model, {"exposure": "auto"}))
-    factor = brightness_metered_as(metered, offers, bench, exposure_s)
+    factor = brightness_metered_as(metered, capabilities, bench, exposure_s)
     return factor, f"brightness: metering chooses {exposure_s:.3g} s at first ({reason})"
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.acquire import CameraOffers, ProtocolModel
+from labrig.acquire import CameraCapabilities, ProtocolModel
 from labrig.fit import EPSILON
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import ProtocolError, UsageError
@@ -218,7 +218,7 @@ class Expectation:
     warnings: tuple[str, ...]
 
 
-def expect(protocol: DecaySettings, offers: CameraOffers, bench: Bench) -> Expectation:
+def expect(protocol: DecaySettings, capabilities: CameraCapabilities, bench: Bench) -> Expectation:
     """Predict every patch of a bench.
 
     Raises
@@ -228,10 +228,10 @@ def expect(protocol: DecaySettings, offers: CameraOffers, bench: Bench) -> Expec
     """
     bench = bench.at_settings(protocol.camera)
     warnings: list[str] = []
-    schedule = expected_schedule(protocol, offers, bench, warnings.append)
+    schedule = expected_schedule(protocol, capabilities, bench, warnings.append)
     series, clipped = {}, {}
     for patch, glow in bench.glows.items():
-        series[patch], clipped[patch] = _series(protocol, offers, bench, patch, schedule)
+        series[patch], clipped[patch] = _series(protocol, capabilities, bench, patch, schedule)
         if protocol.states not in ("auto", len(glow.rate_per_s)):
             warnings.append(
                 f"{patch}: the protocol asks for {protocol.states} states, the material has "
@@ -249,7 +249,7 @@ def expect(protocol: DecaySettings, offers: CameraOffers, bench: Bench) -> Expec
 
 def expected_schedule(
     protocol: DecaySettings,
-    offers: CameraOffers,
+    capabilities: CameraCapabilities,
     bench: Bench,
     warn: Callable[[str], None],
 ) -> Schedule:
@@ -262,12 +262,12 @@ def expected_schedule(
             for patch, glow in bench.glows.items()
         ]
 
-    return protocol.expected_schedule(offers, expected, warn)
+    return protocol.expected_schedule(capabilities, expected, warn)
 
 
 def _series(
     protocol: DecaySettings,
-    offers: CameraOffers,
+    capabilities: CameraCapabilities,
     bench: Bench,
     patch: str,
     schedule: Schedule,
@@ -280,7 +280,7 @@ def _series(
     if protocol.dark == "background" and protocol.background is not None:
         background = dark_frames(camera, protocol.background, frames.channels, exposure_s)
     else:
-        darks_s = np.array(protocol.dark_exposures_s(offers))
+        darks_s = np.array(protocol.dark_exposures_s(capabilities))
         darks = dark_frames(camera, region, frames.channels, darks_s)
     decay = expected_series(glow, t_s, frames, darks, background, bench.flicker)
     usable = np.asarray(~is_clipped(frames.saturated, 1.0).any(axis=1))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.special import ndtr
 
-from labrig.acquire import TYPICAL_BYTES_PER_PIXEL, CameraOffers
+from labrig.acquire import TYPICAL_BYTES_PER_PIXEL, CameraCapabilities
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.region import Region, region_pixels
 from labrig.predict.glow import Glow, state_means
@@ -101,14 +101,14 @@ def typical_read_noise_electrons(iso: float) -> float:
     return math.hypot(TYPICAL_NOISE_BEFORE_GAIN, TYPICAL_NOISE_AFTER_GAIN * 100 / iso)
 
 
-def typical_camera(offers: CameraOffers, iso: float) -> CameraFigures:
+def typical_camera(capabilities: CameraCapabilities, iso: float) -> CameraFigures:
     """Return typical figures for a camera of which at most the size of a frame is known.
 
     If only its file's size is known, the aspect ratio is taken for 3:2.
     """
-    pixels = offers.frame_bytes / TYPICAL_BYTES_PER_PIXEL or TYPICAL_PIXELS
+    pixels = capabilities.frame_bytes / TYPICAL_BYTES_PER_PIXEL or TYPICAL_PIXELS
     rows = 2 * round(math.sqrt(pixels / 6))
-    width, height = offers.frame_pixels or (rows * 3 // 2, rows)
+    width, height = capabilities.frame_pixels or (rows * 3 // 2, rows)
     return CameraFigures(
         width=width,
         height=height,

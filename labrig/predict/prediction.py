@@ -85,7 +85,9 @@ class Trials:
         try:
             variant = changed(self.protocol, change.keys)
             laid_out = plan(variant, self.rig, self.source)
-            patches = predicted_patches(expect(predictable(variant), laid_out.offers, self.bench))
+            patches = predicted_patches(
+                expect(predictable(variant), laid_out.capabilities, self.bench)
+            )
         except (ValidationError, UsageError):
             return None
         return Remedy(
@@ -238,8 +240,8 @@ def predict(
     'for: 3 min'
     """
     decay = predictable(protocol)
-    assumptions = collect_assumptions(protocol, laid_out.offers, sources)
-    expectation = expect(decay, laid_out.offers, assumptions.bench)
+    assumptions = collect_assumptions(protocol, laid_out.capabilities, sources)
+    expectation = expect(decay, laid_out.capabilities, assumptions.bench)
     base = predicted_patches(expectation)
     trials = Trials(protocol, rig, source, assumptions.bench, base, laid_out.duration_s)
     return Prediction(
@@ -247,7 +249,7 @@ def predict(
         materials=assumptions.materials,
         exposures_s=expectation.exposures_s,
         decays=decay.repeats,
-        remedies=trials.remedies(changes(decay, laid_out.offers, base)),
+        remedies=trials.remedies(changes(decay, laid_out.capabilities, base)),
         brightness_known=assumptions.brightness_known,
         notes=assumptions.notes,
         warnings=expectation.warnings,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from labrig.acquire import CameraOffers, ProtocolModel
+from labrig.acquire import CameraCapabilities, ProtocolModel
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import Region
 from labrig.protocols.steps.decays import DecaySettings
@@ -52,7 +52,7 @@ def changed(protocol: ProtocolModel, keys: Keys) -> ProtocolModel:
 
 
 def changes(
-    protocol: DecaySettings, offers: CameraOffers, patches: Iterable[str]
+    protocol: DecaySettings, capabilities: CameraCapabilities, patches: Iterable[str]
 ) -> Iterator[Change]:
     """Yield changes that may determine the rates of `patches` better, one key at a time."""
     if isinstance(protocol.exposure, float):
@@ -67,10 +67,12 @@ def changes(
         ("every", protocol.every * 2),
     ):
         yield Change(f"{key}: {duration_text(seconds)}", {key: f"{seconds!r} s"})
-    for iso in _neighbours(offers.isos, protocol.camera.iso):
+    for iso in _neighbours(capabilities.isos, protocol.camera.iso):
         yield Change(f"iso: {iso}", {"camera": {"iso": iso}})
     f_number = protocol.camera.f_number
-    for wider in [offered for offered in offers.f_numbers if f_number and offered < f_number][-1:]:
+    for wider in [offered for offered in capabilities.f_numbers if f_number and offered < f_number][
+        -1:
+    ]:
         yield Change(f"f_number: {wider:g}", {"camera": {"f_number": wider}})
     larger = {patch: _twice_the_area(protocol.patches[patch]) for patch in patches}
     yield Change("patch of twice the area", {"patches": larger})

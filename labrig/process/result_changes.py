@@ -17,7 +17,7 @@ from labrig.process.provenance import PROVENANCE
 from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
 
 #: Largest number of changed files that are named.
-MOST_FILES = 6
+MAX_FILES = 6
 #: Relative difference of two numbers that are the same but for rounding.
 ROUNDING = 1e-9
 #: Fraction of σ below which the change of a parameter, or of its σ, is not reported.
@@ -105,8 +105,8 @@ def other_settings(before: Path, after: Path) -> tuple[str, ...]:
 
 
 def _listed(files: Sequence[Path]) -> str:
-    named = ", ".join(map(str, files[:MOST_FILES]))
-    more = len(files) - MOST_FILES
+    named = ", ".join(map(str, files[:MAX_FILES]))
+    more = len(files) - MAX_FILES
     return f"{named} and {more} more" if more > 0 else named
 
 

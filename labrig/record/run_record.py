@@ -33,7 +33,7 @@ from labrig.record.plain_folder import require_plain_folder
 #: End of the year 9999 in seconds since 1970, the limit of `datetime`.
 LATEST = 253_402_300_799.0
 #: Largest plausible magnitude of a reading in degrees Celsius.
-LARGEST_TEMPERATURE_C = 1000.0
+MAX_TEMPERATURE_C = 1000.0
 
 #: Names of frames as `AttemptWriter` gives them.
 _FRAME_NAME = re.compile(r"frames/\d{6,}[\w.-]*")
@@ -336,7 +336,7 @@ def _check_times(record: Recorded) -> Recorded:
 
 def _check_reading(reading: TemperatureRecord) -> TemperatureRecord:
     _seconds(reading.time)
-    if not abs(reading.temperature_c) <= LARGEST_TEMPERATURE_C:
+    if not abs(reading.temperature_c) <= MAX_TEMPERATURE_C:
         raise ValueError(f"{reading.temperature_c} °C is no temperature")
     return reading
 

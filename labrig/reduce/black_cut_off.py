@@ -36,7 +36,7 @@ _STANDS_OUT, _LEVELS_ABOVE = 2.0, 3
 #: Most tiles across a plane.
 _TILES_ACROSS = 64
 #: Tiles of similar brightness that are taken together, and the most groups of them.
-_GROUP_TILES, _MOST_GROUPS = 3, 16
+_GROUP_TILES, _MAX_GROUPS = 3, 16
 #: Multiple of the median variance from which a tile has structure or a hot pixel, and of the
 #: variance by differences from which its pixels are not about one level: an edge lies in it.
 _ROUGH, _UNEVEN = 4.0, 2.0
@@ -52,7 +52,7 @@ _STRUCTURE = 0.01
 #: Read noise in photo-electrons where the frame does not tell it, and its σ in logarithms.
 _USUAL_ELECTRONS, _LOG_SIGMA = 5.0, 1.0
 #: Read noise in steps of the camera's numbers below which there is none to be seen.
-_LEAST_NOISE = 0.3
+_MIN_NOISE = 0.3
 #: Difference to the expected fraction of pixels at the lowest level that belies the model.
 _WRONG_FRACTION = 0.1
 #: Fraction of cut-off pixels above which their level cannot be told: it is 2 s below black or more.
@@ -259,7 +259,7 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
     groups = _Groups.of(cut / step)
     start = np.sqrt(np.quantile(groups.variance[groups.at_lowest >= _some(groups.at_lowest)], 0.75))
     groups = groups.below(_NEAR_BLACK * start)
-    if not start > _LEAST_NOISE or not groups.mean.size:
+    if not start > _MIN_NOISE or not groups.mean.size:
         return None
 
     def misfit(logarithms: Floats) -> Floats:
@@ -297,7 +297,7 @@ def _cut_off(planes: Sequence[Mosaic], lowest: int) -> BlackCutOff | None:
     noise = _noise(fit.x)
     mean, _, at_lowest = _moments(noise, groups.mean.max())
     expected_fraction = np.interp(groups.mean, mean, at_lowest)
-    if noise.read < _LEAST_NOISE or (
+    if noise.read < _MIN_NOISE or (
         np.median(np.abs(groups.at_lowest - expected_fraction)) > _WRONG_FRACTION
     ):
         return None
@@ -349,7 +349,7 @@ class _Groups:
             rising = np.argsort(chosen.mean(axis=(1, 2)), kind="stable")
             mean, variance = averaged.mean(axis=(1, 2)), variances_by_differences(averaged)
             at_lowest = (averaged == 0).mean(axis=(1, 2))
-            groups = max(1, min(_MOST_GROUPS, len(cut) // _GROUP_TILES))
+            groups = max(1, min(_MAX_GROUPS, len(cut) // _GROUP_TILES))
             for group in np.array_split(rising, groups):
                 kept = group[variance[group] <= _ROUGH * np.median(variance[group])]
                 rows.append(

@@ -24,7 +24,7 @@ Scalar = TypeVar("Scalar", np.str_, np.float64)
 #: The one channel of a sensor without colour filters.
 MONOCHROME = "L"
 #: Largest period: X-Trans repeats after 6 pixels; beyond 12, too few pixels share a position.
-_LARGEST_SIDE = 12
+_MAX_SIDE = 12
 
 
 def side_of(cfa: str) -> int:
@@ -53,9 +53,9 @@ def smallest_square(colours: Letters, black: Floats) -> tuple[str, tuple[float, 
         The period of both together is too large to be reduced.
     """
     side = math.lcm(*colours.shape, *black.shape)
-    if side > _LARGEST_SIDE:
+    if side > _MAX_SIDE:
         raise FrameError(
-            f"expected colours and black levels that repeat after {_LARGEST_SIDE} pixels or fewer, "
+            f"expected colours and black levels that repeat after {_MAX_SIDE} pixels or fewer, "
             f"got {side}; labrig cannot reduce this kind of sensor"
         )
     letters, levels = _repeat(colours, side), _repeat(black, side)

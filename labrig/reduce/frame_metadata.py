@@ -12,7 +12,7 @@ from labrig.foundation.region import Region, region_pixels
 from labrig.record import FRAMES
 from labrig.reduce.dng import channels_of, side_of
 from labrig.reduce.frame_reduction import StoredFrame, reduce_frames
-from labrig.reduce.kept_reductions import KeptReductions, decoded, encoded
+from labrig.reduce.kept_reductions import ReductionCache, decoded, encoded
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import Exif, RawFrame, read_exif
 
@@ -44,14 +44,14 @@ def frames_exif(frames: Sequence[StoredFrame]) -> list[Exif]:
     [0.5, 0.5]
     """
     folders = {frame.path.parent.parent for frame in frames if frame.path.parent.name == FRAMES}
-    kept = {folder: KeptReductions(folder, ReadExif()) for folder in folders}
+    kept = {folder: ReductionCache(folder, ReadExif()) for folder in folders}
     read = [_exif(frame, kept.get(frame.path.parent.parent)) for frame in frames]
     for reductions in kept.values():
         reductions.write()
     return read
 
 
-def _exif(frame: StoredFrame, kept: KeptReductions | None) -> Exif:
+def _exif(frame: StoredFrame, kept: ReductionCache | None) -> Exif:
     text = kept.get(frame.sha256) if kept and frame.sha256 else None
     if text is not None:
         with suppress(ValueError):

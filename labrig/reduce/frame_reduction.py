@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar, get_type_hints
 
 from labrig.record import FRAMES
 from labrig.reduce.frame_workers import Reduction, reduced_text, texts_from_workers, worker_count
-from labrig.reduce.kept_reductions import KeptReductions, decoded
+from labrig.reduce.kept_reductions import ReductionCache, decoded
 
 Reduced = TypeVar("Reduced")
 
@@ -124,10 +124,10 @@ def reduce_groups(
 
 def _kept_reductions(
     groups: Sequence[Sequence[StoredFrame]], reduction: Reduction[Any]
-) -> dict[Path, KeptReductions]:
+) -> dict[Path, ReductionCache]:
     """Read what was kept of the frames' runs."""
     folders = {folder for group in groups if (folder := _folder(group)) is not None}
-    return {folder: KeptReductions(folder, reduction) for folder in folders}
+    return {folder: ReductionCache(folder, reduction) for folder in folders}
 
 
 def _folder(group: Sequence[StoredFrame]) -> Path | None:
@@ -141,7 +141,7 @@ def _key(group: Sequence[StoredFrame]) -> str:
 
 
 def _kept_outcome(
-    kept: Mapping[Path, KeptReductions], group: Sequence[StoredFrame], kind: Any
+    kept: Mapping[Path, ReductionCache], group: Sequence[StoredFrame], kind: Any
 ) -> Any:
     """Return what was kept of a group of frames; None if there is nothing that can be used."""
     folder = _folder(group)

@@ -17,7 +17,7 @@ from labrig.reduce.saturation import histogram
 #: Frames in which a hot pixel is bright: a cosmic ray does not hit the same pixel twice.
 HOT_FRAMES = 2
 #: Most dark frames in which hot pixels are searched; reading more takes time.
-_MOST_FRAMES = 5
+_MAX_FRAMES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ def hot_pixels_of(darks: Sequence[Exposure]) -> HotPixels | None:
     longest = [dark for dark in darks if dark.exposure_s >= longest_s * (1 - SAME_EXPOSURE)]
     if len(longest) < HOT_FRAMES:
         return None
-    return _bright_in_several(reduce_frames(longest[:_MOST_FRAMES], BrightPixels()))
+    return _bright_in_several(reduce_frames(longest[:_MAX_FRAMES], BrightPixels()))
 
 
 def _bright_in_several(darks: Sequence[BrightPlaces]) -> HotPixels:

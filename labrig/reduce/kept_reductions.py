@@ -104,7 +104,7 @@ _MODULES = (
 )
 
 
-class KeptReductions:
+class ReductionCache:
     """Outcomes of one reduction for the frames of one run.
 
     Parameters

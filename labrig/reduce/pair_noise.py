@@ -33,7 +33,7 @@ from labrig.reduce.rounding import ROUNDING_VARIANCE
 #: Number of strips of a patch, if it has that many rows of each colour.
 STRIPS = 16
 #: Degrees of freedom from which pairs replace each frame's own estimate: σ is then known to 10 %.
-FEWEST_DOF = 50
+MIN_DOF = 50
 #: Brightness in σ of the mean from which the frames of a pair are scaled to each other; below it
 #: their structure is within the noise.
 SCALED_SIGMAS = 5.0
@@ -232,7 +232,7 @@ class SensorNoise:
     @classmethod
     def of_patches(cls, patches: Sequence[PatchPairs]) -> "SensorNoise | None":
         """Return the noise that all pairs have in common; None if they are too few."""
-        if sum(pairs.dof for pairs in patches) < FEWEST_DOF:
+        if sum(pairs.dof for pairs in patches) < MIN_DOF:
             return None
         channels = range(patches[0].frames.light.shape[1])
         return cls(
@@ -288,7 +288,7 @@ def paired_noise(
         part = frames.take(rows)
         light = PatchPairs.of_unit(part, t_s[rows], usable[rows])
         shared = together.get(name)
-        if light.dof < FEWEST_DOF:
+        if light.dof < MIN_DOF:
             if shared is not None:
                 sigma[rows] = shared.sigma(part)
             continue
@@ -315,7 +315,7 @@ def paired_dark_sigma(darks: PatchFrames) -> Floats:
     few.
     """
     pairs = PatchPairs.of_like_exposure(darks)
-    if pairs.dof < FEWEST_DOF:
+    if pairs.dof < MIN_DOF:
         return darks.sigma
     channels = range(darks.sigma.shape[1])
     return np.stack([_sigma_of_means(pairs, channel) for channel in channels], axis=1)

@@ -100,7 +100,7 @@ class Exif:
 #: Value of EXIF 2.3 for an ISO above 65534, which is in another tag.
 _ISO_OVERFLOW = 65535
 #: Most digits of a fraction of a second.
-_MOST_SUBSECOND_DIGITS = 9
+_MAX_SUBSECOND_DIGITS = 9
 #: Names that exifread gives the tag of DNG files: by its number, or by its name.
 _DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
 
@@ -184,7 +184,7 @@ def _time(tags: dict[str, Any]) -> tuple[float | None, float]:
         time = datetime.strptime(text, "%Y:%m:%d %H:%M:%S").replace(tzinfo=UTC).timestamp()
     except (ValueError, OverflowError):
         return None, 1.0
-    if not (digits.isascii() and digits.isdigit() and len(digits) <= _MOST_SUBSECOND_DIGITS):
+    if not (digits.isascii() and digits.isdigit() and len(digits) <= _MAX_SUBSECOND_DIGITS):
         return time, 1.0
     return time + int(digits) / 10 ** len(digits), 10.0 ** -len(digits)
 

@@ -27,12 +27,12 @@ from labrig.report.parameters import interval_tables
 from labrig.report.sections import Picture, Section, Table
 
 #: Largest number of points of each part; more readings are averaged.
-MOST_POINTS = 150
+MAX_POINTS = 150
 #: Range of the residuals' axis in σ, and half width of its shade.
 FARTHEST, SHADED = 10.0, 2.0
 HEIGHT_PT, RESIDUALS_PT = 330.0, 118.0
 #: Decades of light that a logarithmic axis shows at most.
-MOST_DECADES = 5.0
+MAX_DECADES = 5.0
 
 
 def charge_report(fit: ChargeFit, about: RunDescription) -> Report:
@@ -139,7 +139,7 @@ def _methods(fit: ChargeFit) -> Section:
 def _figures(fit: ChargeFit) -> Section:
     lit = np.arange(len(fit.readings.t_s)) < fit.n_charge
     after_s = fit.readings.t_s - fit.charge_s
-    averaged = max(fit.n_charge, fit.n_decay) > MOST_POINTS
+    averaged = max(fit.n_charge, fit.n_decay) > MAX_POINTS
     caption = (
         f"{'Means of neighbouring readings' if averaged else 'Readings'} with ± 1 σ and the fit, "
         "dark level included. Below: their distance from the fit in σ; within the shade are 95 % "
@@ -179,7 +179,7 @@ def _chart(
         time = logarithmic_axis(label, float(t_s[0]) * 0.8, float(t_s[-1]) * 1.2)
         top = float(value.max())
         positive = value[value > 0]
-        low = max(float(positive.min()) * 0.7, top * 10.0**-MOST_DECADES)
+        low = max(float(positive.min()) * 0.7, top * 10.0**-MAX_DECADES)
         vertical = logarithmic_axis("Light", min(low, top / 10), top * 1.6)
     else:
         last = float(t_s[-1])
@@ -207,10 +207,10 @@ def _chart(
 
 def _groups(t_s: FloatArray, is_logarithmic: bool) -> list[NDArray[np.intp]]:
     """Return the indices of the readings of each point."""
-    if len(t_s) <= MOST_POINTS:
+    if len(t_s) <= MAX_POINTS:
         return [np.array([row]) for row in range(len(t_s))]
     spaced = np.geomspace if is_logarithmic else np.linspace
-    edges = spaced(t_s[0], t_s[-1], MOST_POINTS + 1)
+    edges = spaced(t_s[0], t_s[-1], MAX_POINTS + 1)
     places = np.unique(np.searchsorted(t_s, [*edges[:-1], np.inf]))
     return [np.arange(begin, end) for begin, end in pairwise(places)]
 

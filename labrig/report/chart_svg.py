@@ -30,7 +30,7 @@ HANDLE, HANDLE_GAP, COLUMN_GAP, ROW = 1.6, 0.4, 1.0, 1.36
 #: Approximate widths of narrow, wide and other characters of DejaVu Sans, relative to its size.
 NARROW, WIDE, MEDIAN = 0.37, 0.84, 0.62
 #: Farthest distance in points of anything from the axes' edges; no viewer draws at a million.
-FARTHEST_PT = 1000.0
+MAX_PT = 1000.0
 #: Largest distance in points by which points are left out of a curve.
 TOLERANCE_PT = 0.03
 
@@ -207,7 +207,7 @@ def _at(axis: Axis, values: FloatArray, length_pt: float) -> FloatArray:
         values = np.log10(np.maximum(values, 1e-300))
         low, high = np.log10([low, high]).tolist()
     distance = (values - low) / (high - low) * length_pt
-    return np.asarray(np.clip(distance, -FARTHEST_PT, length_pt + FARTHEST_PT))
+    return np.asarray(np.clip(distance, -MAX_PT, length_pt + MAX_PT))
 
 
 def _positions(axis: Axis, length_pt: float) -> FloatArray:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 #: Lines of keys, conflicts and wishes that are written one by one.
-MOST_LINES = 20
+MAX_LINES = 20
 #: ΔE2000 from which a difference is seen.
 SEEN = 1.0
 #: Part of a glow whose loss is told.
@@ -238,7 +238,7 @@ def _keys(design: Design, places: Sequence[str]) -> Iterator[str]:
     name = f" {'place':12}" if len(places) > 1 else ""
     yield f"{'key':4}{'at':>10}{name}  {'wanted R, G, B':27} {'got':27} ΔE2000"
     for key, (first, second) in enumerate(zip(wanted, got, strict=True)):
-        if key == MOST_LINES:
+        if key == MAX_LINES:
             worst = int(design.delta_e2000.argmax())
             yield (
                 f"{keys.count - key} more; the largest difference of all is "
@@ -261,10 +261,10 @@ def _conflicts(design: Design) -> Iterator[str]:
 
 
 def _impossible(design: Design) -> Iterator[str]:
-    for wish in design.impossible[:MOST_LINES]:
+    for wish in design.impossible[:MAX_LINES]:
         yield f"! {wish}"
-    if len(design.impossible) > MOST_LINES:
-        yield f"! {len(design.impossible) - MOST_LINES} more wishes are not possible"
+    if len(design.impossible) > MAX_LINES:
+        yield f"! {len(design.impossible) - MAX_LINES} more wishes are not possible"
 
 
 def draw_curve(axes: "Axes", design: Design, number: int, name: str) -> None:
@@ -301,7 +301,7 @@ def draw_patches(
     What is got may be that of a rendering instead of the design's, shape (keys, 3).
     """
     own = np.flatnonzero(design.keys.place == number)
-    own = own[np.argsort(design.keys.time_s[own])][:MOST_LINES]
+    own = own[np.argsort(design.keys.time_s[own])][:MAX_LINES]
     wanted = design.keys.rgb(design.bands)[own]
     got = (design.got_rgb if got_rgb is None else got_rgb)[own]
     for column, (first, second) in enumerate(zip(wanted, got, strict=True)):
@@ -332,7 +332,7 @@ def _numbers(values: FloatArray) -> str:
 
 
 #: Frames that are drawn, spread over the keys.
-MOST_FRAMES = 6
+MAX_FRAMES = 6
 #: Part of the pixels that may be brighter than white where no key says how bright a frame is.
 UNCLIPPED_PER_CENT = 99.0
 
@@ -439,7 +439,7 @@ def draw_scene_design(found: SceneDesign | SpreadDesign, path: Path) -> None:
 
     require_picture(path)
     times = np.unique(found.wish.keys.time_s)
-    times = times[np.linspace(0, len(times) - 1, min(len(times), MOST_FRAMES)).round().astype(int)]
+    times = times[np.linspace(0, len(times) - 1, min(len(times), MAX_FRAMES)).round().astype(int)]
     pictures = found.pictures(times.tolist())
     numbers = sorted(set(found.wish.keys.place.tolist()))
     height, width = pictures.shape[1:3]

@@ -38,7 +38,7 @@ _MARKERS = re.compile(
     r'<g( [^>]*)?>((?:<use [^>]*style="([^"]*)"/>)(?:<use [^>]*style="\3"/>)*)</g>'
 )
 _COLOUR = re.compile("|".join(VARIABLES))
-_LONGEST_SLUG = 40
+_MAX_SLUG = 40
 #: Dots per inch of images in a figure, such as a matrix; all else has none.
 _IMAGE_DPI = 200
 
@@ -128,7 +128,7 @@ def _element(box: str, body: str, description: str) -> Markup:
 
 def slug(name: str) -> str:
     """Return a name with letters, digits and hyphens only, as addresses, files and ids need it."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", name)[:_LONGEST_SLUG].strip("-")
+    return re.sub(r"[^A-Za-z0-9]+", "-", name)[:_MAX_SLUG].strip("-")
 
 
 def _matplotlib_body(figure: "Figure") -> str:

@@ -26,7 +26,7 @@ STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 #: Number of decades of an axis below which ticks between decades are labelled, too.
 FEW_DECADES = 2.0
 #: Number of labels below which evenly spaced ticks are labelled instead.
-FEWEST_LABELS = 2
+MIN_LABELS = 2
 
 
 def linear_ticks(
@@ -59,7 +59,7 @@ def decade_ticks(low: float, high: float, most: int = 8) -> tuple[Ticks, tuple[f
     if high < low * 10**FEW_DECADES:
         labelled = [digit * 10.0**decade for decade in labelled_decades for digit in (1, 2, 5)]
     labelled = [tick for tick in labelled if low <= tick <= high]
-    if len(labelled) < FEWEST_LABELS:
+    if len(labelled) < MIN_LABELS:
         labelled = [tick for tick, _ in linear_ticks(low, high, 5)]
     multiples = [digit * 10.0**decade for decade in decades for digit in range(2, 10)]
     short = tuple(tick for tick in multiples if low <= tick <= high) if step == 1 else ()

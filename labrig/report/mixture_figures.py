@@ -57,7 +57,7 @@ HEIGHT_PT = 256.0
 #: End of the scale of differences, of the strongest re-radiation.
 APART = 0.25
 #: Least error on a logarithmic axis.
-LEAST_MSE = 1e-15
+MIN_MSE = 1e-15
 ELLIPSE_POINTS = 73
 #: Points of a curve of a density.
 CURVE_POINTS = 401
@@ -299,7 +299,7 @@ def _error_chart(
     numbers: FloatArray, mse: FloatArray, fit: MixtureFit, noise: float | None
 ) -> Chart:
     """Return the chart of the error against the number of components."""
-    exponent = math.floor(math.log10(max(float(mse.min()), LEAST_MSE)))
+    exponent = math.floor(math.log10(max(float(mse.min()), MIN_MSE)))
     unit = 10.0**exponent
     marks, legend = _number_marks(numbers, mse / unit, fit.components)
     before = Points(
@@ -317,7 +317,7 @@ def _error_chart(
         line = Line(MUTED, np.array(ends), np.full(2, noise / unit), style=DASHED)
         marks, legend = (line, *marks), (*legend, ("noise", line))
         every.append(noise)
-    low, high = max(min(every), LEAST_MSE) / unit, max(*every, LEAST_MSE) / unit
+    low, high = max(min(every), MIN_MSE) / unit, max(*every, MIN_MSE) / unit
     panel = Panel(
         _number_axis(*ends),
         logarithmic_axis(f"Mean squared error / {power_of_ten(exponent)}", low / 1.6, high * 1.6),

@@ -26,7 +26,7 @@ from labrig.results import UNDIVIDED, Budget, RunResult
 
 HEIGHT_PT = 180.0
 #: Longest run in s whose time axis is in minutes; that of longer runs is in hours.
-LONGEST_IN_MINUTES_S = 3 * 3600.0
+MAX_IN_MINUTES_S = 3 * 3600.0
 #: Smallest span of the temperature axis in °C, so that the noise of a steady room looks small.
 MIN_SPAN_C = 2.0
 
@@ -48,7 +48,7 @@ def temperature_figure(
         Begin and end of each shaded time of the glow in seconds after the begin of the run, shape
         (m, 2).
     """
-    unit_s, unit = (60.0, "min") if time_s[-1] <= LONGEST_IN_MINUTES_S else (3600.0, "h")
+    unit_s, unit = (60.0, "min") if time_s[-1] <= MAX_IN_MINUTES_S else (3600.0, "h")
     middle = (float(celsius.min()) + float(celsius.max())) / 2
     reach = max(float(np.ptp(celsius)) * 1.1, MIN_SPAN_C) / 2
     low, high, last = middle - reach, middle + reach, float(time_s[-1]) / unit_s

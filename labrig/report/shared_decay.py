@@ -22,7 +22,7 @@ from labrig.results import Series, SharedDecay
 
 HEIGHT_PT = 300.0
 #: Decades of relative signal that are shown at most, and number of points of a curve.
-MOST_DECADES, POINTS = 5.0, 160
+MAX_DECADES, POINTS = 5.0, 160
 
 
 def shared_decay_report(
@@ -118,7 +118,7 @@ def _figure(fit: SharedDecay, series: Sequence[Series]) -> Chart:
         values = (part.values[rows, 0] - table.offset) / first
         sigma = np.nan_to_num(part.sigma[rows, 0]) / first
         after_s = t_s + exposure_s / 2 - first_s
-        shown = values > 10.0**-MOST_DECADES
+        shown = values > 10.0**-MAX_DECADES
         marks += [
             ErrorBars(colour, after_s[shown], values[shown], sigma[shown]),
             Points(colour, after_s[shown], values[shown], marker, size_pt=3.2),

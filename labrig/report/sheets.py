@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 COLUMNS = 8
 CELL_INCHES = (1.5, 1.75)
 #: Re-radiation per 10 nm that is dark at least: what is weaker than this is noise in most cells.
-LEAST_TOP = 0.02
+MIN_TOP = 0.02
 #: Characters of a name that fit above a cell.
 NAME_CHARACTERS = 20
 
@@ -75,7 +75,7 @@ def draw_contact_sheet(matrices: Sequence[ReradiationMatrix], light: Spectrum, p
             axes.set_axis_off()
         caption = (
             "re-radiation by incident (across) and returning wavelength (up), each to its own "
-            f"maximum, {LEAST_TOP:g} per {BAND_NM:g} nm at least; colour under {light.name}"
+            f"maximum, {MIN_TOP:g} per {BAND_NM:g} nm at least; colour under {light.name}"
         )
         figure.supxlabel(caption, fontsize="small", color=MUTED)
         save_picture(figure, path)
@@ -91,7 +91,7 @@ def _draw_cell(axes: "Axes", matrix: ReradiationMatrix, light: Spectrum) -> None
     start, end = max(left, bottom), min(right, high)
     corners = [(start, start), (end, end), (right, bottom), (start, bottom)]
     axes.add_patch(Polygon(corners, facecolor=screen_colour(matrix, light), linewidth=0))
-    draw_heat(axes, matrix, values, (0.0, max(largest(values), LEAST_TOP)))
+    draw_heat(axes, matrix, values, (0.0, max(largest(values), MIN_TOP)))
     axes.set(xticks=[], yticks=[], xlim=(left, right), ylim=(bottom, high))
     name = matrix.name if len(matrix.name) <= NAME_CHARACTERS else matrix.name[:19] + "…"
     fraction = 100 * max(float(matrix.reradiated_fraction.max()), 0.0)
@@ -101,7 +101,7 @@ def _draw_cell(axes: "Axes", matrix: ReradiationMatrix, light: Spectrum) -> None
 Bytes = NDArray[np.uint8]
 
 #: Widths in pixels between which frames are shown as they are; smaller ones are magnified.
-LEAST_PX, MOST_PX = 200, 480
+MIN_PX, MAX_PX = 200, 480
 #: Largest width of a sheet in pixels, and margins for texts and between frames.
 SHEET_PX = 2000
 GAP_PX, LABEL_PX, TITLE_PX, CAPTION_PX = 14, 28, 46, 34
@@ -199,10 +199,10 @@ def _resized(frame: Bytes) -> Bytes:
     import cv2
 
     height, width = frame.shape[:2]
-    if width > MOST_PX:
-        size = (MOST_PX, max(1, round(height * MOST_PX / width)))
+    if width > MAX_PX:
+        size = (MAX_PX, max(1, round(height * MAX_PX / width)))
         return np.asarray(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
-    times = math.ceil(LEAST_PX / width)
+    times = math.ceil(MIN_PX / width)
     return frame.repeat(times, axis=0).repeat(times, axis=1)
 
 

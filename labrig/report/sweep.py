@@ -22,7 +22,7 @@ from labrig.results import Measured
 #: Ratio of the largest to the least value from which an axis is logarithmic.
 MANY_TIMES = 8.0
 #: Largest number of values that are written below the axis as they were typed.
-MOST_TEXTS = 8
+MAX_TEXTS = 8
 HEIGHT_PT = 300.0
 COLOURS = (INK, OTHER_CHANNELS[1], OTHER_CHANNELS[0], OTHER_CHANNELS[2], *CHANNEL.values())
 
@@ -114,6 +114,6 @@ def _key_axis(key: str, texts: Mapping[float, str]) -> Axis:
         axis = logarithmic_axis(key, low / 1.5, high * 1.5)
     else:
         axis = linear_axis(key, low - 0.08 * (high - low), high + 0.08 * (high - low))
-    if len(texts) > MOST_TEXTS:
+    if len(texts) > MAX_TEXTS:
         return axis
     return Axis(key, axis.low, axis.high, tuple(sorted(texts.items())), (), is_logarithmic)

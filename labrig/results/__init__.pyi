@@ -43,7 +43,7 @@ from .fitted_decay import (
     FittedDecay as FittedDecay,
     ScatterSigma as ScatterSigma,
     UnseenState as UnseenState,
-    frames_for as frames_for,
+    recommended_sampling as recommended_sampling,
 )
 from .fitted_decay_file import (
     find_fitted_decays as find_fitted_decays,

@@ -15,7 +15,7 @@ from labrig.results.measured import Measured
 #: Width in nm of the input bands between the lights.
 INPUT_BAND_NM = 10.0
 #: Gap in nm of the reflectance that is bridged between two lights.
-WIDEST_GAP_NM = 40.0
+MAX_GAP_NM = 40.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +200,7 @@ class DirectColumns:
         for left, right in pairwise(known):
             gap = slice(left + 1, right)
             ends_nm, ends = self.output_nm[[left, right]], self.reflectance[[left, right]]
-            if ends_nm[1] - ends_nm[0] <= WIDEST_GAP_NM:
+            if ends_nm[1] - ends_nm[0] <= MAX_GAP_NM:
                 value[gap] = np.interp(self.output_nm[gap], ends_nm, ends)
                 widest = self.reflectance_sigma[[left, right]].max()
                 sigma[gap] = np.hypot(widest, (ends[1] - ends[0]) / 2)

@@ -36,7 +36,7 @@ LINE_WIDTH = 100
 #: Relative difference below which the σ of all values is given as one.
 _SAME_SIGMA = 0.05
 #: Change of a rate in σ from which what it would be due to is worth a word.
-WORTH_A_WORD = 0.3
+REPORTED_ABOVE_SIGMA = 0.3
 #: Version of `fit.json`: another number means renamed keys or other meanings.
 SCHEMA_VERSION = 5
 
@@ -176,10 +176,10 @@ class UnseenState:
     @property
     def remedy(self) -> str:
         """Timing of the frames that would show it."""
-        return frames_for(self.lifetime_s)
+        return recommended_sampling(self.lifetime_s)
 
 
-def frames_for(lifetime_s: float) -> str:
+def recommended_sampling(lifetime_s: float) -> str:
     """Return the timing of frames that shows a state, in words.
 
     Parameters
@@ -194,8 +194,8 @@ def frames_for(lifetime_s: float) -> str:
 
     Examples
     --------
-    >>> from labrig.results import frames_for
-    >>> frames_for(2.0)
+    >>> from labrig.results import recommended_sampling
+    >>> recommended_sampling(2.0)
     'frames closer together than 1 s in the first 6 s'
     """
     return f"frames closer together than {lifetime_s / 2:.2g} s in the first {3 * lifetime_s:.2g} s"
@@ -586,7 +586,7 @@ class FittedDecay:
             _largest_in_sigma(rate_changes, rates),
             _largest_in_sigma(amplitude_changes, amplitudes),
         ]
-        if max(in_sigma for _, in_sigma in largest) < WORTH_A_WORD:
+        if max(in_sigma for _, in_sigma in largest) < REPORTED_ABOVE_SIGMA:
             return ""
         of_rates, of_amplitudes = (
             f"{rounded(100 * relative, 2)} % ({rounded(in_sigma, 2)} σ)"

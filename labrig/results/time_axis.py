@@ -82,7 +82,7 @@ _SHORTEST, _LONGEST = 0.1, 20.0
 #: A width of a channel and the step of the times that differ by more are not of one unit.
 _OTHER_UNIT = 500.0
 #: Largest share of steps back in a column without a name that may be times.
-_MOST_FALLS = 0.25
+_MAX_FALLS = 0.25
 #: Units that are proposed.
 _COMMON_UNITS = ("ps", "ns", "µs", "ms", "s", "min", "h")
 #: Names of a column with the dates of a clock.
@@ -90,7 +90,7 @@ _DATES = frozenset({"date", "datum", "day", "tag", "jour", "fecha", "data"})
 #: Seconds since 1970, or 1904, that no clock shows: such a number counts a smaller unit.
 _NO_SECONDS = 1e11
 #: Fewest rows that tell hours, minutes and seconds, written together, from seconds.
-_FEWEST_DIGITAL = 5
+_MIN_DIGITAL = 5
 _UNSTATED = "s, as no line states another unit"
 
 
@@ -239,7 +239,7 @@ def _without_names(
     if layout.time_unit is None and not is_clock(table.rows[0][column]):
         falls = np.diff(numbers) < 0
         beside = [_numbers(table, other) for other in range(1, len(table.rows[0]))]
-        if _MOST_FALLS < falls.sum() / max(len(falls), 1) < 1 or (
+        if _MAX_FALLS < falls.sum() / max(len(falls), 1) < 1 or (
             falls.any() and any(np.all(np.diff(other) > 0) for other in beside)
         ):
             raise UsageError(
@@ -328,7 +328,7 @@ def _refuse_no_seconds(table: Block, column: int, name: str) -> None:
             "thousands of years: say '--time-unit ms', or which it is"
         )
     hours, minutes, seconds = times // 10_000, times // 100 % 100, times % 100
-    if len(times) < _FEWEST_DIGITAL or not (
+    if len(times) < _MIN_DIGITAL or not (
         np.all((hours < 24) & (minutes < 60) & (seconds < 60)) and np.all(times >= 0)
     ):
         return

@@ -20,9 +20,9 @@ from labrig.foundation.input_file import open_regular, read_text
 from labrig.foundation.output_file import write_private, write_text
 from labrig.seal.signature import ED25519, PublicKey
 
-_MOST_BYTES = 100_000
+_MAX_BYTES = 100_000
 #: Longest name of a laboratory.
-_LONGEST_NAME = 80
+_MAX_NAME = 80
 
 
 @dataclass(frozen=True)
@@ -105,9 +105,9 @@ def create_key(path: Path, name: str) -> LabKey:
     ('ssh-ed25519', ['Optics', 'lab,', 'Example', 'University'])
     """
     name = " ".join(name.split())
-    if not name or not name.isprintable() or len(name) > _LONGEST_NAME:
+    if not name or not name.isprintable() or len(name) > _MAX_NAME:
         raise UsageError(
-            f"expected the name of a laboratory in at most {_LONGEST_NAME} characters, got {name!r}"
+            f"expected the name of a laboratory in at most {_MAX_NAME} characters, got {name!r}"
         )
     key = LabKey(name, Ed25519PrivateKey.generate())
     content = key.private.private_bytes(Encoding.PEM, PrivateFormat.OpenSSH, NoEncryption())
@@ -152,7 +152,7 @@ def read_key(path: Path) -> LabKey:
     """
     with open_regular(path) as file:
         mode = stat.S_IMODE(os.fstat(file.fileno()).st_mode)
-        content = file.read(_MOST_BYTES)
+        content = file.read(_MAX_BYTES)
     if os.name != "nt" and mode & 0o077:
         raise UsageError(
             f"{path}: expected a key that nobody else can read, got one of mode {mode:o}; if "
@@ -173,8 +173,8 @@ def read_key(path: Path) -> LabKey:
 def _name_beside(path: Path) -> str:
     """Return the name in the file with the public key."""
     with suppress(UsageError):
-        words = read_text(public_file(path), _MOST_BYTES).split(maxsplit=2)
+        words = read_text(public_file(path), _MAX_BYTES).split(maxsplit=2)
         name = " ".join(words[2].split()) if len(words) > 2 else ""
         if name and name.isprintable():
-            return name[:_LONGEST_NAME]
+            return name[:_MAX_NAME]
     return "unnamed"

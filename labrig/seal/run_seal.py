@@ -159,7 +159,7 @@ def _files(folder: Path) -> Iterator[Path]:
 #: Files of the list and of its signature in a run folder.
 SEAL = "seal.sha256"
 SIGNATURE = f"{SEAL}.sig"
-_MOST_SIGNATURE_BYTES = 10_000
+_MAX_SIGNATURE_BYTES = 10_000
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,7 @@ def read_seal(folder: Path) -> RunSeal | None:
         return None
     try:
         content = read_bytes(paths[0], MAX_TEXT_BYTES)
-        signer = signer_of(content, read_text(paths[1], _MOST_SIGNATURE_BYTES))
+        signer = signer_of(content, read_text(paths[1], _MAX_SIGNATURE_BYTES))
         return RunSeal(FileList.parse(content.decode()), signer)
     except (UsageError, DataError, UnicodeDecodeError) as error:
         raise DataError(f"{folder / SEAL}: the seal is broken: {error}") from None

@@ -207,7 +207,7 @@ def _texts(content: bytes) -> list[bytes]:
     return texts
 
 
-_MOST_BYTES = 1_000_000
+_MAX_BYTES = 1_000_000
 _NAMESPACES = re.compile(r'namespaces="([^"]*)"', re.IGNORECASE)
 
 
@@ -265,7 +265,7 @@ def read_signers(path: Path) -> Signers:
     'Example lab'
     """
     names: dict[PublicKey, str] = {}
-    for number, line in enumerate(read_text(path, _MOST_BYTES).splitlines(), start=1):
+    for number, line in enumerate(read_text(path, _MAX_BYTES).splitlines(), start=1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         try:

@@ -16,7 +16,7 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.region import Region, parse_region
 from labrig.foundation.yaml_file import validate
-from labrig.local_server import LocalConversation, LocalServer
+from labrig.local_server import LocalServer, RequestHandler
 from labrig.setup.patches_block import KEY, rounded, write_patches
 from labrig.setup.picture_stats import decode, picture_stats
 
@@ -223,7 +223,7 @@ class ViewServer(LocalServer):
         super().__init__(port, _Conversation)
 
 
-class _Conversation(LocalConversation):
+class _Conversation(RequestHandler):
     """A connection of a browser."""
 
     server: ViewServer

@@ -80,7 +80,7 @@ def _delays(duration_s: float, count: int, *, is_last: bool) -> FloatArray:
 #: Name of the page in messages about what it sent.
 SOURCE = "the page"
 #: Most states and bands of a material that is set by hand.
-MOST_STATES, MOST_BANDS = 2, 100
+MAX_STATES, MAX_BANDS = 2, 100
 #: Digits of the numbers that are sent.
 DIGITS = 5
 
@@ -94,10 +94,10 @@ class SetByHand(FrozenModel):
         As of `labrig.design.Parameters`.
     """
 
-    k_r_per_s: Annotated[tuple[Positive, ...], Field(max_length=MOST_STATES)]
-    k_e_per_s: Annotated[tuple[tuple[NotNegative, ...], ...], Field(max_length=MOST_STATES)]
-    reradiation: Annotated[tuple[tuple[NotNegative, ...], ...], Field(max_length=MOST_STATES)]
-    albedo: Annotated[tuple[UnitFraction, ...], Field(max_length=MOST_BANDS)]
+    k_r_per_s: Annotated[tuple[Positive, ...], Field(max_length=MAX_STATES)]
+    k_e_per_s: Annotated[tuple[tuple[NotNegative, ...], ...], Field(max_length=MAX_STATES)]
+    reradiation: Annotated[tuple[tuple[NotNegative, ...], ...], Field(max_length=MAX_STATES)]
+    albedo: Annotated[tuple[UnitFraction, ...], Field(max_length=MAX_BANDS)]
     order: Positive = 1.0
 
     def parameters(self) -> Parameters:

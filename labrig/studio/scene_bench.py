@@ -51,7 +51,7 @@ WIDTH_PX, PATHS = 192, 16
 #: Name of the place that is shown before a dot is set.
 BRIGHTEST = "brightest place"
 #: Lights of one bands, programme and albedo that are kept.
-MOST_LIGHTS = 4
+MAX_LIGHTS = 4
 #: Albedo of the material at first.
 ALBEDO = 0.6
 #: Percentile of the picture's luminance that automatic exposure shows so bright.
@@ -425,7 +425,7 @@ def _kept(
     """Return light that was made before, or make it; the oldest is forgotten."""
     if key not in lights:
         made = make()
-        while len(lights) >= MOST_LIGHTS:
+        while len(lights) >= MAX_LIGHTS:
             lights.pop(next(iter(lights)))
         lights[key] = made
     return lights[key]

@@ -12,7 +12,7 @@ from labrig.foundation.clock import Clock
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import beside
 from labrig.foundation.yaml_file import read_model
-from labrig.local_server import LocalConversation, LocalServer
+from labrig.local_server import LocalServer, RequestHandler
 from labrig.studio.scene_bench import SceneBench
 from labrig.studio.workbench import Workbench
 
@@ -69,7 +69,7 @@ class StudioServer(LocalServer):
         super().__init__(port, _Conversation)
 
 
-class _Conversation(LocalConversation):
+class _Conversation(RequestHandler):
     """A connection of a browser."""
 
     server: StudioServer

@@ -29,7 +29,7 @@ from labrig.foundation.yaml_file import parse_yaml, validate, yaml_text
 from labrig.material import Material, material_text
 from labrig.report import describe_energy, describe_factor, describe_nearest, draw_design
 from labrig.studio.messages import (
-    MOST_STATES,
+    MAX_STATES,
     SOURCE,
     Asked,
     answer,
@@ -146,7 +146,7 @@ class Workbench:
 
     def preset_names(self) -> list[str]:
         """Return the names of the measured materials with which a design may begin."""
-        return [each.name for each in presets() if len(each.states) <= MOST_STATES]
+        return [each.name for each in presets() if len(each.states) <= MAX_STATES]
 
     def preset(self, content: Mapping[str, Any]) -> dict[str, Any]:
         """Return the parameters of a measured material, as if they were set by hand.

@@ -27,7 +27,7 @@ _STEPS = 10.0
 #: Fraction of the rows that are copies, and length of a run of equal values, from which they are.
 _FRACTION, _RUN = 0.15, 5
 #: Fewest copies, and fewest rows that tell them.
-_FEWEST, _FEWEST_ROWS = 4, 10
+_FEWEST, _MIN_ROWS = 4, 10
 #: Rows before and after a run in which the last digit of its values is looked for, and how well
 #: they are multiples of it.
 _NEAR, _MULTIPLE = 10, 1e-3
@@ -87,7 +87,7 @@ def held_readings(values: FloatArray) -> BoolArray:
     """
     none = np.zeros(len(values), dtype=np.bool_)
     starts = np.flatnonzero(np.append(True, np.diff(values) != 0))
-    if len(values) < _FEWEST_ROWS or len(starts) < _FEWEST or len(starts) == len(values):
+    if len(values) < _MIN_ROWS or len(starts) < _FEWEST or len(starts) == len(values):
         return none
     lengths = np.diff(np.append(starts, len(values)))
     level = values[starts]
@@ -157,7 +157,7 @@ def _last_written(levels: FloatArray, level: float) -> float:
 #: Photons that get rare go to zero from some counts at once.
 _STEPS_BELOW_CEILING, _STEPS_ABOVE_FLOOR = 10.0, 50.0
 #: Fewest equal values, and fraction of the values from the first to the last of them.
-_FEWEST_AT_CEILING, _FEWEST_AT_FLOOR, _LIMIT_FRACTION = 3, 5, 0.5
+_MIN_AT_CEILING, _MIN_AT_FLOOR, _LIMIT_FRACTION = 3, 5, 0.5
 
 #: Values beside those at the limit from which the last digit is found.
 _LIMIT_NEAR = 20
@@ -187,7 +187,7 @@ def at_ceiling(values: FloatArray) -> BoolArray:
     rows = np.flatnonzero(values == values.max())
     first, end = rows[0], rows[-1] + 1
     beside = np.append(values[max(first - 1, 0) : first], values[end : end + 1])
-    if len(rows) < max(_FEWEST_AT_CEILING, _LIMIT_FRACTION * (end - first)) or not len(beside):
+    if len(rows) < max(_MIN_AT_CEILING, _LIMIT_FRACTION * (end - first)) or not len(beside):
         return found
     step = _step(values, first, end)
     if values[first] - beside.max() >= _STEPS_BELOW_CEILING * step:
@@ -223,7 +223,7 @@ def at_floor(values: FloatArray) -> BoolArray:
     if not len(others) or values[-1] > values.min():
         return found
     first = int(others[-1]) + 1
-    if len(values) - first < _FEWEST_AT_FLOOR:
+    if len(values) - first < _MIN_AT_FLOOR:
         return found
     step = _step(values, first, len(values))
     if values[first - 1] - values[-1] >= _STEPS_ABOVE_FLOOR * step:
@@ -252,9 +252,9 @@ _NINES = re.compile(r"9{3,10}0*")
 #: A power of ten, which some meters show for overload: 1e9.
 _POWER = re.compile(r"10*")
 #: How far beyond every other value a number of nines, or a power of ten from 1e6 on, is a mark.
-_BEYOND_NINES, _BEYOND_POWERS, _LEAST_NINES, _LEAST_POWER = 10.0, 1e4, 999, 1e6
+_BEYOND_NINES, _BEYOND_POWERS, _LEAST_NINES, _MIN_POWER = 10.0, 1e4, 999, 1e6
 #: Fewest other values that tell so of either.
-_FEWEST_NINES, _FEWEST_POWERS = 3, 8
+_FEWEST_NINES, _MIN_POWERS = 3, 8
 
 
 def no_measurements(cells: Sequence[str], number: Callable[[str], float | None]) -> dict[int, str]:
@@ -311,8 +311,8 @@ def _far_marks(values: dict[int, float]) -> set[int]:
         digits = repr(abs(value)).split("e")[0].replace(".", "")
         if abs(value) >= _LEAST_NINES and _NINES.fullmatch(digits):
             candidates[value] = _BEYOND_NINES, _FEWEST_NINES
-        elif abs(value) >= _LEAST_POWER and _POWER.fullmatch(digits):
-            candidates[value] = _BEYOND_POWERS, _FEWEST_POWERS
+        elif abs(value) >= _MIN_POWER and _POWER.fullmatch(digits):
+            candidates[value] = _BEYOND_POWERS, _MIN_POWERS
     found: set[int] = set()
     # From the farthest on, since a mark may hide another: 9.99999e9 beside -9999.
     for value in sorted(candidates, key=abs, reverse=True):

@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Never
 
 from labrig.foundation.clock import Clock
 from labrig.foundation.input_file import read_text
-from labrig.local_server import KINDS, LocalConversation, LocalServer
+from labrig.local_server import KINDS, LocalServer, RequestHandler
 from labrig.watch.run_follower import RunFollower
 
 #: Period of messages without which a browser takes the connection for dead.
 HEARTBEAT_S = 5.0
 #: Time after which a browser reconnects, in ms.
-COME_BACK_MS = 500
+RECONNECT_MS = 500
 _HERE = Path(__file__).parent
 _PAGE = _HERE / "watch_page.html"
 #: Placeholder in the page for the first update.
@@ -130,7 +130,7 @@ class WatchServer(LocalServer):
         super().__init__(port, _Conversation)
 
 
-class _Conversation(LocalConversation):
+class _Conversation(RequestHandler):
     """A connection of a browser."""
 
     server: WatchServer
@@ -170,7 +170,7 @@ class _Conversation(LocalConversation):
         self.send_header("Cache-Control", "no-store")
         self.send_header("Connection", "close")
         self.end_headers()
-        self.wfile.write(f"retry: {COME_BACK_MS}\n\n".encode())
+        self.wfile.write(f"retry: {RECONNECT_MS}\n\n".encode())
         last_id = self.headers.get("Last-Event-ID") or self.query("after") or "0"
         number = int(last_id) if last_id.isdecimal() and len(last_id) < 12 else 0
         while True:

@@ -20,7 +20,7 @@ from labrig.acquire import (
     ProtocolModel,
     RigFile,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
 )
 from labrig.foundation.errors import ProtocolError
@@ -47,7 +47,7 @@ Coordinate = Annotated[float, Field(ge=0, le=1)]
 #: Angle between light and camera at which a sphere is seen.
 SPHERE_ANGLE_DEG = 45
 #: Least number of repositionings from which scatter is measured.
-LEAST_REPOSITIONINGS = 3
+MIN_REPOSITIONINGS = 3
 
 
 class Circle(FrozenModel):
@@ -162,7 +162,7 @@ class AngularFluorescence(ProtocolModel):
     channels: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     angles: tuple[Angle, ...] = Field((30, 45, 60, 75, 90, 105), min_length=2)
     directions: tuple[Direction, ...] = Field(("vertical", "horizontal"), min_length=1)
-    repositionings: Count = Field(4, ge=LEAST_REPOSITIONINGS)
+    repositionings: Count = Field(4, ge=MIN_REPOSITIONINGS)
     region: Region = (0.1, 0.12, 0.3, 0.3)
     circle: Circle | None = None
     light: SphereLight = SphereLight()
@@ -305,10 +305,10 @@ class ViewUnit:
         settings = self.bracketing.settings(exposure_s)
         _light(session, self.pose.led)
         for _ in range(self.bracketing.repeats):
-            session.perform(Shoot(AngularFrames.VIEW, settings))
+            session.perform(TakeFrame(AngularFrames.VIEW, settings))
         session.perform(LEDS_OFF)
         for _ in range(self.bracketing.repeats):
-            session.perform(Shoot(AngularFrames.OFF, settings))
+            session.perform(TakeFrame(AngularFrames.OFF, settings))
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ MIN_REACH = 0.02
 #: Sideways shift of the series of one figure against each other, in degrees.
 APART_DEG = 1.2
 #: p below which no digits are told.
-LEAST_P = 1e-6
+MIN_P = 1e-6
 
 
 def render(result: AngularFluorescenceResult, source: Source) -> Rendered:
@@ -88,7 +88,7 @@ def _named_tests(result: AngularFluorescenceResult) -> Iterator[tuple[str, Depen
 
 
 def _p(p: float) -> str:
-    return f"p < {LEAST_P:g}" if p < LEAST_P else f"p = {p:.2g}"
+    return f"p < {MIN_P:g}" if p < MIN_P else f"p = {p:.2g}"
 
 
 def _percent(test: DependenceTest) -> str:

@@ -13,10 +13,10 @@ from pydantic import Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
-    CameraOffers,
+    CameraCapabilities,
     ExposureSettings,
     Session,
-    Shoot,
+    TakeFrame,
     at,
 )
 from labrig.foundation.errors import ProtocolError
@@ -126,10 +126,10 @@ class Blank(ConfiguredProtocol):
         """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
-    def exposures_s(self, offers: CameraOffers) -> tuple[float, float]:
+    def exposures_s(self, capabilities: CameraCapabilities) -> tuple[float, float]:
         """Return the shutter times of a sequence's first frame and of all others, in seconds."""
-        longest_s = longest_exposure_s(self.every, offers)
-        return min(offers.exposure_at_most(self.exposure), longest_s), longest_s
+        longest_s = longest_exposure_s(self.every, capabilities)
+        return min(capabilities.exposure_at_most(self.exposure), longest_s), longest_s
 
     def times_s(self, earliest_s: float, later_s: float) -> list[float]:
         """Return the begin of each frame of a sequence in seconds after lamp off."""
@@ -148,12 +148,12 @@ class BlankDarkUnit:
         """Photograph at the shortest shutter time and at the later ones; refuse a burning lamp."""
         session.wait_until_warm("camera")
         face_camera(session)
-        offers = session.rig[CAMERA].offers()
-        times_s = [offers.exposures_s[0], *self.protocol.exposures_s(offers)]
+        capabilities = session.rig[CAMERA].capabilities()
+        times_s = [capabilities.exposures_s[0], *self.protocol.exposures_s(capabilities)]
         for exposure_s in dict.fromkeys(times_s):
             for _ in range(DARKS_PER_EXPOSURE):
-                session.perform(Shoot(FrameRole.DARK, self.protocol.settings(exposure_s)))
-        shorter = [self.protocol.settings(time_s) for time_s in offers.exposures_s[:3]]
+                session.perform(TakeFrame(FrameRole.DARK, self.protocol.settings(exposure_s)))
+        shorter = [self.protocol.settings(time_s) for time_s in capabilities.exposures_s[:3]]
         SanityChecks(session, self.name, [self.protocol.region], None).require_darkness(shorter)
 
 
@@ -173,7 +173,7 @@ class SequenceUnit:
         """Charge and photograph, a little later in each sequence."""
         protocol = self.protocol
         session.wait_until_warm("camera")
-        first_s, others_s = protocol.exposures_s(session.rig[CAMERA].offers())
+        first_s, others_s = protocol.exposures_s(session.rig[CAMERA].capabilities())
         visible_s = visible_after_s(session.rig)
         earliest_s = visible_s or EARLIEST_S
         if protocol.first != "auto" and protocol.first < visible_s:
@@ -189,7 +189,7 @@ class SequenceUnit:
                 *(
                     at(
                         time_s,
-                        Shoot(BLANK_FRAMES, protocol.settings(others_s if number else first_s)),
+                        TakeFrame(BLANK_FRAMES, protocol.settings(others_s if number else first_s)),
                     )
                     for number, time_s in enumerate(times_s)
                 ),

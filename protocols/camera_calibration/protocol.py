@@ -15,10 +15,10 @@ from pydantic import Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
-    CameraOffers,
+    CameraCapabilities,
     ExposureSettings,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
 )
 from labrig.foundation.quantity import Count, DurationS
@@ -64,7 +64,7 @@ REFERENCE_EVERY = 3
 FLATS = 4
 
 #: The settings of a bracket, its reference first.
-Bracket = Callable[[CardLight, CameraOffers, ExposureSettings], Sequence[ExposureSettings]]
+Bracket = Callable[[CardLight, CameraCapabilities, ExposureSettings], Sequence[ExposureSettings]]
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,16 @@ class PhotonUnit:
     def run(self, session: Session) -> None:
         """Take two frames at each level."""
         light_card(session)
-        light, offers = card_light(session, self.reference, self.card), session.rig[CAMERA].offers()
+        light, capabilities = (
+            card_light(session, self.reference, self.card),
+            session.rig[CAMERA].capabilities(),
+        )
         settings = replace(self.reference, iso=self.iso)
         fractions = np.linspace(*PHOTON_FRACTIONS, self.levels)
-        shots = [light.exposed(float(fraction), settings, offers) for fraction in fractions]
+        shots = [light.exposed(float(fraction), settings, capabilities) for fraction in fractions]
         for shot in dict.fromkeys(shots):
-            session.perform(Shoot(CardFrames.PHOTON, shot))
-            session.perform(Shoot(CardFrames.PHOTON, shot))
+            session.perform(TakeFrame(CardFrames.PHOTON, shot))
+            session.perform(TakeFrame(CardFrames.PHOTON, shot))
 
 
 @dataclass(frozen=True)
@@ -106,9 +109,9 @@ class RepeatUnit:
         """Photograph at the reference exposure."""
         light_card(session)
         light = card_light(session, self.reference, self.card)
-        shot = light.exposed(HALF, self.reference, session.rig[CAMERA].offers())
+        shot = light.exposed(HALF, self.reference, session.rig[CAMERA].capabilities())
         for _ in range(self.repeats):
-            session.perform(Shoot(CardFrames.REPEAT, shot))
+            session.perform(TakeFrame(CardFrames.REPEAT, shot))
 
 
 @dataclass(frozen=True)
@@ -129,9 +132,9 @@ class FlatUnit:
         light_card(session)
         light = card_light(session, self.reference, self.card)
         settings = replace(self.reference, f_number=self.f_number)
-        shot = light.exposed(HALF, settings, session.rig[CAMERA].offers())
+        shot = light.exposed(HALF, settings, session.rig[CAMERA].capabilities())
         for _ in range(FLATS):
-            session.perform(Shoot(CardFrames.FLAT, shot))
+            session.perform(TakeFrame(CardFrames.FLAT, shot))
 
 
 @dataclass(frozen=True)
@@ -148,21 +151,21 @@ class BracketUnit:
         """Photograph forwards in one cycle, backwards in the next, so that the drift cancels."""
         light_card(session)
         light = card_light(session, self.reference, self.card)
-        first, *others = self.bracket(light, session.rig[CAMERA].offers(), self.reference)
+        first, *others = self.bracket(light, session.rig[CAMERA].capabilities(), self.reference)
         for cycle in range(self.cycles):
             order = others if cycle % 2 == 0 else others[::-1]
             for shot in _interleaved(order, first):
-                session.perform(Shoot(CardFrames.BRACKET, shot))
+                session.perform(TakeFrame(CardFrames.BRACKET, shot))
 
 
 def linearity_bracket(
-    light: CardLight, offers: CameraOffers, reference: ExposureSettings
+    light: CardLight, capabilities: CameraCapabilities, reference: ExposureSettings
 ) -> Sequence[ExposureSettings]:
     """Return shutter times from near darkness to saturation."""
     low, high = (light.exposure_s(fraction, reference) for fraction in LINEARITY_FRACTIONS)
     return [
-        light.exposed(HALF, reference, offers),
-        *(replace(reference, exposure_s=time_s) for time_s in _between(offers, low, high)),
+        light.exposed(HALF, reference, capabilities),
+        *(replace(reference, exposure_s=time_s) for time_s in _between(capabilities, low, high)),
     ]
 
 
@@ -171,13 +174,13 @@ def shutter_bracket(every_nth: int, f_numbers: Sequence[float | None]) -> Bracke
     smallest = max((f_number or 0.0 for f_number in f_numbers), default=0.0)
 
     def bracket(
-        light: CardLight, offers: CameraOffers, reference: ExposureSettings
+        light: CardLight, capabilities: CameraCapabilities, reference: ExposureSettings
     ) -> Sequence[ExposureSettings]:
-        shots = [light.exposed(HALF, reference, offers)]
+        shots = [light.exposed(HALF, reference, capabilities)]
         stopped_down = replace(reference, f_number=smallest) if smallest else reference
         for settings in dict.fromkeys([reference, stopped_down]):
             low, high = (light.exposure_s(fraction, settings) for fraction in (LEAST, MOST))
-            times_s = _between(offers, low, high)[::-1][::every_nth]
+            times_s = _between(capabilities, low, high)[::-1][::every_nth]
             shots += [replace(settings, exposure_s=time_s) for time_s in times_s]
         return shots
 
@@ -188,9 +191,9 @@ def iso_bracket(isos: Sequence[int]) -> Bracket:
     """Return one shutter time at every ISO."""
 
     def bracket(
-        light: CardLight, offers: CameraOffers, reference: ExposureSettings
+        light: CardLight, capabilities: CameraCapabilities, reference: ExposureSettings
     ) -> Sequence[ExposureSettings]:
-        shot = light.exposed(MOST, replace(reference, iso=max(isos)), offers)
+        shot = light.exposed(MOST, replace(reference, iso=max(isos)), capabilities)
         settings = replace(reference, exposure_s=shot.exposure_s)
         return [settings, *(replace(settings, iso=iso) for iso in isos if iso != reference.iso)]
 
@@ -201,10 +204,10 @@ def aperture_bracket(f_numbers: Sequence[float | None]) -> Bracket:
     """Return one shutter time at every aperture."""
 
     def bracket(
-        light: CardLight, offers: CameraOffers, reference: ExposureSettings
+        light: CardLight, capabilities: CameraCapabilities, reference: ExposureSettings
     ) -> Sequence[ExposureSettings]:
         widest = min(f_numbers, key=lambda f_number: f_number or 0.0)
-        shot = light.exposed(MOST, replace(reference, f_number=widest), offers)
+        shot = light.exposed(MOST, replace(reference, f_number=widest), capabilities)
         settings = replace(reference, exposure_s=shot.exposure_s)
         others = [f_number for f_number in f_numbers if f_number != reference.f_number]
         return [settings, *(replace(settings, f_number=f_number) for f_number in others)]
@@ -212,10 +215,10 @@ def aperture_bracket(f_numbers: Sequence[float | None]) -> Bracket:
     return bracket
 
 
-def _between(offers: CameraOffers, low_s: float, high_s: float) -> list[float]:
+def _between(capabilities: CameraCapabilities, low_s: float, high_s: float) -> list[float]:
     """Return the offered shutter times of that range, at least two."""
-    times_s = [time_s for time_s in offers.exposures_s if low_s <= time_s <= high_s * 1.0001]
-    return times_s if len(times_s) > 1 else list(offers.exposures_s[:2])
+    times_s = [time_s for time_s in capabilities.exposures_s if low_s <= time_s <= high_s * 1.0001]
+    return times_s if len(times_s) > 1 else list(capabilities.exposures_s[:2])
 
 
 def _interleaved(

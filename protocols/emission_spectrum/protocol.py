@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import CAMERA, RigFile, Session, Shoot, at
+from labrig.acquire import CAMERA, RigFile, Session, TakeFrame, at
 from labrig.calibration import LVF_KIND
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, duration_text
@@ -65,7 +65,7 @@ WHITE_EXPOSURES_S = (1 / 1024, 1 / 256, 1 / 64, 1 / 16, 1 / 4)
 WHITES_PER_EXPOSURE = 2
 
 #: Fewest colour filters that tell a spectrum.
-FEWEST_FILTERS = 4
+MIN_FILTERS = 4
 
 #: Reasons for the configurations.
 THROUGH_IT = "the glow is photographed through it"
@@ -85,7 +85,7 @@ class CameraFilters(FrozenModel):
         others in.
     """
 
-    filters: tuple[str, ...] = Field(min_length=FEWEST_FILTERS)
+    filters: tuple[str, ...] = Field(min_length=MIN_FILTERS)
 
     @model_validator(mode="after")
     def _every_one_once(self) -> Self:
@@ -252,7 +252,7 @@ class SpectrumUnit:
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot(self.protocol.role, self.protocol.settings(exposure_s)))
+                    at(time_s, TakeFrame(self.protocol.role, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in schedule.frames()
                 ),
             ]
@@ -275,10 +275,11 @@ class WhiteUnit:
         """Switch the lamp on, unless it burns, and take a ladder of exposures; it burns on."""
         session.wait_until_warm("camera")
         light_card(session)
-        offers = session.rig[CAMERA].offers()
+        capabilities = session.rig[CAMERA].capabilities()
         for nominal_s in WHITE_EXPOSURES_S:
-            shoot = Shoot(
-                SpectrumFrames.WHITE, self.protocol.settings(offers.exposure_at_most(nominal_s))
+            shoot = TakeFrame(
+                SpectrumFrames.WHITE,
+                self.protocol.settings(capabilities.exposure_at_most(nominal_s)),
             )
             for _ in range(WHITES_PER_EXPOSURE):
                 session.perform(shoot)

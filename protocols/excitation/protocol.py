@@ -20,12 +20,12 @@ from labrig.acquire import (
     LAMP_OFF,
     LAMP_ON,
     LEDS,
-    CameraOffers,
+    CameraCapabilities,
     LampSwitch,
     LedSwitch,
     ManualStep,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     at,
 )
@@ -246,23 +246,27 @@ class ExcitationSettings(MeteredSettings):
             pause_s *= PAUSES_GROW
         return times_s
 
-    def longest_exposures_s(self, offers: CameraOffers, lasting_s: float) -> list[float]:
+    def longest_exposures_s(
+        self, capabilities: CameraCapabilities, lasting_s: float
+    ) -> list[float]:
         """Return the longest offered shutter time of each frame; the last two are alike.
 
         A camera must be ready again before the next frame.
         """
         times_s = self.frame_times_s(lasting_s)
         pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
-        return [longest_exposure_s(pause_s, offers) for pause_s in (*pauses_s, pauses_s[-1])]
+        return [longest_exposure_s(pause_s, capabilities) for pause_s in (*pauses_s, pauses_s[-1])]
 
-    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+    def dark_exposures_s(self, capabilities: CameraCapabilities) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
-        return dark_exposures_s(max(self.longest_exposures_s(offers, self.last_decay)), offers)
+        return dark_exposures_s(
+            max(self.longest_exposures_s(capabilities, self.last_decay)), capabilities
+        )
 
-    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+    def meter_ladder(self, capabilities: CameraCapabilities) -> list[tuple[float, float]]:
         """Return begin after lamp off and shutter time of each metering frame."""
-        longest_s = max(self.longest_exposures_s(offers, self.duration))
-        return ladder(self.first, longest_s, offers)
+        longest_s = max(self.longest_exposures_s(capabilities, self.duration))
+        return ladder(self.first, longest_s, capabilities)
 
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
         """Return the sanity checks of a unit's frames."""
@@ -335,10 +339,12 @@ class ExcitationUnit:
         rest_s = session.decide("rest", lambda: self._rest_s(session), when_planned=rule.at_most)
         session.rest(rest_s)
         exposure_s = max(
-            self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
+            self.protocol.longest_exposures_s(
+                session.rig[CAMERA].capabilities(), self.protocol.duration
+            )
         )
         face_camera(session)
-        session.perform(Shoot(FrameRole.REST, self.protocol.settings(exposure_s)))
+        session.perform(TakeFrame(FrameRole.REST, self.protocol.settings(exposure_s)))
         face_lamp(session)
 
     def _rest_s(self, session: Session) -> float:
@@ -376,14 +382,14 @@ class _MeterUnit(ExcitationUnit):
 
     def _meter(self, session: Session, charge_s: float) -> None:
         session.wait_until_warm("camera")
-        ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
+        ladder = self.protocol.meter_ladder(session.rig[CAMERA].capabilities())
         check_visible(session, ladder[0][0])
         charge(session, charge_s, self.light_on)
         session.run_sequence(
             [
                 *lights_out(session, self.light_off),
                 *(
-                    at(time_s, Shoot(FrameRole.METER, self.protocol.settings(exposure_s)))
+                    at(time_s, TakeFrame(FrameRole.METER, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in ladder
                 ),
             ]
@@ -468,16 +474,16 @@ class _ChargeUnit(ExcitationUnit):
 
     def _charge(self, session: Session, role: str, charge_s: float, lasting_s: float) -> None:
         self.rest(session)
-        offers = session.rig[CAMERA].offers()
+        capabilities = session.rig[CAMERA].capabilities()
         schedule = self._schedule(session, role, charge_s, lasting_s)
-        longest_s = self.protocol.longest_exposures_s(offers, lasting_s)
+        longest_s = self.protocol.longest_exposures_s(capabilities, lasting_s)
         check_visible(session, self.protocol.first)
         charge(session, charge_s, self.light_on)
         session.run_sequence(
             [
                 *lights_out(session, self.light_off),
                 *(
-                    at(time_s, Shoot(role, self.protocol.settings(min(exposure_s, most_s))))
+                    at(time_s, TakeFrame(role, self.protocol.settings(min(exposure_s, most_s))))
                     for (time_s, exposure_s), most_s in zip(
                         schedule.frames(), longest_s, strict=True
                     )
@@ -487,18 +493,19 @@ class _ChargeUnit(ExcitationUnit):
 
     def _schedule(self, session: Session, role: str, charge_s: float, lasting_s: float) -> Schedule:
         """Return exposures that follow from the longest similar charge, else from the metering."""
-        protocol, offers = self.protocol, session.rig[CAMERA].offers()
+        protocol, capabilities = self.protocol, session.rig[CAMERA].capabilities()
         times_s = protocol.frame_times_s(lasting_s)
-        longest_s = max(protocol.longest_exposures_s(offers, lasting_s))
+        longest_s = max(protocol.longest_exposures_s(capabilities, lasting_s))
 
         def decide() -> Schedule:
             reference_s, frames = self._reference_charge(session, role)
             schedule = DecayMeter([self.measure(frame) for frame in frames]).schedule(
-                times_s, offers, longest_s, EXPOSURES_GROW, self._warner(session)
+                times_s, capabilities, longest_s, EXPOSURES_GROW, self._warner(session)
             )
             shorter = max(charge_s / reference_s / HEADROOM, 1.0)
             exposures_s = [
-                offers.exposure_at_most(exposure_s / shorter) for exposure_s in schedule.exposures_s
+                capabilities.exposure_at_most(exposure_s / shorter)
+                for exposure_s in schedule.exposures_s
             ]
             return Schedule(schedule.times_s, tuple(exposures_s))
 

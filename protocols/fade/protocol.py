@@ -17,10 +17,10 @@ from labrig.acquire import (
     CAMERA,
     LAMP_OFF,
     LAMP_ON,
-    CameraOffers,
+    CameraCapabilities,
     ExposureSettings,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     at,
 )
@@ -137,14 +137,16 @@ class Fade(ConfiguredProtocol):
         first_s = number / self.passes * self.every
         return frame_times_s(first_s, self.every, self.until)
 
-    def fade_exposure_s(self, delay_s: float, light: CardLight, offers: CameraOffers) -> float:
+    def fade_exposure_s(
+        self, delay_s: float, light: CardLight, capabilities: CameraCapabilities
+    ) -> float:
         """Return the longest shutter time in which even a slowly fading lamp does not clip."""
         steady_s = light.exposure_s(HALF, self.settings())
         remaining_s = SLOWEST_S * math.exp(-delay_s / SLOWEST_S)
         if remaining_s <= steady_s:
-            return offers.exposure_at_most(self.longest)
+            return capabilities.exposure_at_most(self.longest)
         filled_s = -SLOWEST_S * math.log1p(-steady_s / remaining_s)
-        return offers.exposure_at_most(min(filled_s, self.longest))
+        return capabilities.exposure_at_most(min(filled_s, self.longest))
 
     def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, metering, the warm-up, and passes over all delays, in the warm lamp."""
@@ -177,13 +179,13 @@ class PassUnit:
 
     def run(self, session: Session) -> None:
         """Photograph the steady lamp, the fade and the rise at every delay."""
-        protocol, offers = self.protocol, session.rig[CAMERA].offers()
+        protocol, capabilities = self.protocol, session.rig[CAMERA].capabilities()
         session.wait_until_warm("camera")
         light_card(session)
         light = card_light(session, protocol.settings(), protocol.card)
-        steady = light.exposed(HALF, protocol.settings(), offers)
+        steady = light.exposed(HALF, protocol.settings(), capabilities)
         for delay_s in protocol.delays_s(self.number):
-            exposure_s = protocol.fade_exposure_s(delay_s, light, offers)
+            exposure_s = protocol.fade_exposure_s(delay_s, light, capabilities)
             for _ in range(1 + protocol.repeat_late):
                 if not self._missed(session, delay_s, steady, exposure_s):
                     break
@@ -192,15 +194,15 @@ class PassUnit:
         self, session: Session, delay_s: float, steady: ExposureSettings, exposure_s: float
     ) -> bool:
         """Photograph one delay; return whether something began late."""
-        session.perform(Shoot(LampFrames.STEADY, steady))
-        fading = Shoot(LampFrames.FADE, replace(steady, exposure_s=exposure_s))
+        session.perform(TakeFrame(LampFrames.STEADY, steady))
+        fading = TakeFrame(LampFrames.FADE, replace(steady, exposure_s=exposure_s))
         missed = session.run_sequence([at(0.0, LAMP_OFF), at(delay_s, fading)])
         if not self.protocol.rise:
             session.perform(LAMP_ON)
             session.wait(STEADY_S, "lamp settles")
             return bool(missed)
         session.wait(STEADY_S, "lamp cools")
-        rising = [at(0.0, LAMP_ON), at(delay_s, Shoot(LampFrames.RISE, steady))]
+        rising = [at(0.0, LAMP_ON), at(delay_s, TakeFrame(LampFrames.RISE, steady))]
         missed = [*missed, *session.run_sequence(rising)]
         session.wait(STEADY_S, "lamp settles")
         return bool(missed)
@@ -219,11 +221,11 @@ class WarmingUnit:
         session.wait_until_warm("camera")
         light_card(session)
         light = card_light(session, protocol.settings(), protocol.card)
-        steady = light.exposed(HALF, protocol.settings(), session.rig[CAMERA].offers())
+        steady = light.exposed(HALF, protocol.settings(), session.rig[CAMERA].capabilities())
         session.perform(LAMP_OFF)
         session.wait(COOLS_S, "lamp's housing cools")
         shots = [
-            at(time_s + number * WARMING_EVERY_S, Shoot(LampFrames.WARMING, steady))
+            at(time_s + number * WARMING_EVERY_S, TakeFrame(LampFrames.WARMING, steady))
             for time_s in WARMING_S
             for number in range(WARMING_SHOTS)
         ]

@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import ManualStep, Session, Shoot, Unit, at
+from labrig.acquire import ManualStep, Session, TakeFrame, Unit, at
 from labrig.foundation.quantity import Count, DurationS, duration_text
 from labrig.foundation.region import Region
 from labrig.protocols.steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
@@ -130,7 +130,7 @@ class AngleUnit:
             )
         late_s = max(first_s, 0.0) - self.protocol.first
         glow = [
-            (time_s, Shoot(self.protocol.role, self.protocol.settings(exposure_s)))
+            (time_s, TakeFrame(self.protocol.role, self.protocol.settings(exposure_s)))
             for time_s, exposure_s in schedule.frames()
         ]
         session.run_sequence([at(time_s + late_s, shoot) for time_s, shoot in glow])

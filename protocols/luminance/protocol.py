@@ -19,13 +19,13 @@ from labrig.acquire import (
     CAMERA,
     LAMP,
     LAMP_ON,
-    CameraOffers,
+    CameraCapabilities,
     ExposureSettings,
     LampType,
     ProtocolModel,
     RigFile,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     at,
 )
@@ -389,22 +389,24 @@ class Luminance(ProtocolModel):
         """Return the camera settings with that shutter time, at the card's ISO or another one."""
         return ExposureSettings(exposure_s, iso or self.camera.iso, self.camera.f_number)
 
-    def longest_exposure_s(self, at_s: float, offers: CameraOffers) -> float:
+    def longest_exposure_s(self, at_s: float, capabilities: CameraCapabilities) -> float:
         """Return the longest shutter time at a time after lamp off."""
-        return offers.exposure_at_most(min(self.longest, SHORT * at_s))
+        return capabilities.exposure_at_most(min(self.longest, SHORT * at_s))
 
-    def next_s(self, begin_s: float, offers: CameraOffers) -> float:
+    def next_s(self, begin_s: float, capabilities: CameraCapabilities) -> float:
         """Return the begin of the frame after one, however long that exposes."""
-        spent_s = self.longest_exposure_s(begin_s, offers) + offers.overhead_s + MARGIN_S
+        spent_s = (
+            self.longest_exposure_s(begin_s, capabilities) + capabilities.overhead_s + MARGIN_S
+        )
         return max(begin_s + spent_s, begin_s * STEP)
 
-    def first_frames(self, offers: CameraOffers) -> list[tuple[float, float]]:
+    def first_frames(self, capabilities: CameraCapabilities) -> list[tuple[float, float]]:
         """Return begin and shutter time of the first frames: one of them is right."""
         frames, at_s = [], self.first
         for fraction in FIRST:
-            exposure_s = offers.exposure_at_most(self.longest * fraction)
+            exposure_s = capabilities.exposure_at_most(self.longest * fraction)
             frames.append((at_s, exposure_s))
-            at_s += exposure_s + offers.overhead_s + MARGIN_S
+            at_s += exposure_s + capabilities.overhead_s + MARGIN_S
         return frames
 
     def checks(self, session: Session, unit: str) -> SanityChecks:
@@ -443,16 +445,16 @@ class LuminanceDarkUnit:
     def run(self, session: Session) -> None:
         """Photograph in the dark; refuse a light."""
         session.wait_until_warm("camera")
-        offers, protocol = session.rig[CAMERA].offers(), self.protocol
+        capabilities, protocol = session.rig[CAMERA].capabilities(), self.protocol
         exposures = [
-            protocol.settings(offers.exposure_at_most(protocol.longest * part), self.iso)
+            protocol.settings(capabilities.exposure_at_most(protocol.longest * part), self.iso)
             for part in (1 / 64, 1 / 4, 1)
             for _ in range(DARKS_PER_EXPOSURE)
         ]
         checks = protocol.checks(session, self.name)
         dark_frames(session, self.name, checks.patches, exposures)
         checks.require_darkness(
-            [protocol.settings(exposure_s, self.iso) for exposure_s in offers.exposures_s[:3]]
+            [protocol.settings(exposure_s, self.iso) for exposure_s in capabilities.exposures_s[:3]]
         )
 
 
@@ -495,15 +497,15 @@ class GlowUnit:
         protocol = self.protocol
         session.wait_until_warm("camera")
         check_visible(session, protocol.first)
-        offers = session.rig[CAMERA].offers()
-        first = protocol.first_frames(offers)
+        capabilities = session.rig[CAMERA].capabilities()
+        first = protocol.first_frames(capabilities)
         self._excite(session)
         off_s = session.clock.now()
         session.run_sequence(
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot(LuminanceFrames.GLOW, protocol.settings(exposure_s)))
+                    at(time_s, TakeFrame(LuminanceFrames.GLOW, protocol.settings(exposure_s)))
                     for time_s, exposure_s in first
                 ),
             ]
@@ -513,9 +515,11 @@ class GlowUnit:
     def _follow(self, session: Session, last_s: float, off_s: float) -> None:
         """Photograph the glow from the last of the first frames on until it is dim."""
         protocol, iso, is_checked = self.protocol, self.protocol.camera.iso, False
-        offers, is_over = session.rig[CAMERA].offers(), False
+        capabilities, is_over = session.rig[CAMERA].capabilities(), False
         while not is_over:
-            begin_s = max(protocol.next_s(last_s, offers), session.clock.now() - off_s + MARGIN_S)
+            begin_s = max(
+                protocol.next_s(last_s, capabilities), session.clock.now() - off_s + MARGIN_S
+            )
             is_over = begin_s > protocol.until
             if not is_over:
                 shots = self._photograph(session, begin_s, off_s, iso)
@@ -533,14 +537,14 @@ class GlowUnit:
 
     def _photograph(self, session: Session, begin_s: float, off_s: float, iso: int) -> Shots:
         """Take the next frames from a time after lamp off, and return them."""
-        offers = session.rig[CAMERA].offers()
+        capabilities = session.rig[CAMERA].capabilities()
         shots = session.decide(
             "exposures",
-            lambda: self._next(session, begin_s, iso, offers),
-            self._longest(begin_s, iso, offers),
+            lambda: self._next(session, begin_s, iso, capabilities),
+            self._longest(begin_s, iso, capabilities),
         )
         now_s = session.clock.now() - off_s
-        glow = [Shoot(LuminanceFrames.GLOW, settings) for settings in shots.settings]
+        glow = [TakeFrame(LuminanceFrames.GLOW, settings) for settings in shots.settings]
         timed = zip(shots.begins_s, glow, strict=True)
         session.run_sequence([at(time_s - now_s, shoot) for time_s, shoot in timed])
         return shots
@@ -570,13 +574,13 @@ class GlowUnit:
                 session.perform(LAMP_ON)
         session.wait(protocol.excitation.conditions.time_s, "excitation")
 
-    def _longest(self, begin_s: float, iso: int, offers: CameraOffers) -> Shots:
+    def _longest(self, begin_s: float, iso: int, capabilities: CameraCapabilities) -> Shots:
         """Return frames with the longest exposures that `_next` can return."""
-        exposures_s = [self.protocol.longest_exposure_s(begin_s, offers)] * TOGETHER
-        return self._shots(begin_s, [(exposure_s, iso) for exposure_s in exposures_s], offers)
+        exposures_s = [self.protocol.longest_exposure_s(begin_s, capabilities)] * TOGETHER
+        return self._shots(begin_s, [(exposure_s, iso) for exposure_s in exposures_s], capabilities)
 
     def _shots(
-        self, begin_s: float, wanted: Sequence[tuple[float, int]], offers: CameraOffers
+        self, begin_s: float, wanted: Sequence[tuple[float, int]], capabilities: CameraCapabilities
     ) -> Shots:
         """Return frames of these exposures and ISOs until the run's end."""
         begins_s, settings = [], []
@@ -585,31 +589,35 @@ class GlowUnit:
                 break
             begins_s.append(begin_s)
             settings.append(self.protocol.settings(exposure_s, iso))
-            begin_s = self.protocol.next_s(begin_s, offers)
+            begin_s = self.protocol.next_s(begin_s, capabilities)
         return Shots(tuple(begins_s), tuple(settings))
 
-    def _next(self, session: Session, begin_s: float, iso: int, offers: CameraOffers) -> Shots:
+    def _next(
+        self, session: Session, begin_s: float, iso: int, capabilities: CameraCapabilities
+    ) -> Shots:
         """Return the next frames, from the last one that does not clip.
 
         They are as bright as the target, if the glow falls inversely as the time.
         """
         frame, measured = self._last(session)
         if measured is None:
-            return self._shots(begin_s, [(offers.exposures_s[0], iso)] * TOGETHER, offers)
+            return self._shots(
+                begin_s, [(capabilities.exposures_s[0], iso)] * TOGETHER, capabilities
+            )
         channels = [channel for patch in measured.patches for channel in patch.channels.values()]
         at_s = self.protocol.first + measured.start_s - self._frames(session)[0].start_time
         to_begin = at_s / begin_s / (range_dn(measured) * measured.exposure_s * frame.iso)
         mean_per_s = to_begin * max(channel.mean for channel in channels)
         peak_per_s = to_begin * max(max(channel.peak for channel in channels), 1.0)
-        limit_s = self.protocol.longest_exposure_s(begin_s, offers)
+        limit_s = self.protocol.longest_exposure_s(begin_s, capabilities)
         before, isos = iso, self.protocol.isos()
         while iso < isos[-1] and mean_per_s * iso * limit_s < LOW:
             iso = isos[isos.index(iso) + 1]
-        exposure_s = offers.exposure_at_most(min(TARGET / (peak_per_s * iso), limit_s))
+        exposure_s = capabilities.exposure_at_most(min(TARGET / (peak_per_s * iso), limit_s))
         if iso > before:
             in_turn = [(exposure_s, before), (exposure_s, iso)] * AT_EITHER
-            return self._shots(begin_s, in_turn, offers)
-        return self._shots(begin_s, [(exposure_s, iso)] * TOGETHER, offers)
+            return self._shots(begin_s, in_turn, capabilities)
+        return self._shots(begin_s, [(exposure_s, iso)] * TOGETHER, capabilities)
 
     def _last(self, session: Session) -> tuple[FrameRecord, MeteringFrame | None]:
         """Return the unit's last frame in which no patch clips; None if all clip."""

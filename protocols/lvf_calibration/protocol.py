@@ -14,7 +14,7 @@ from labrig.acquire import (
     Optics,
     RigFile,
     Session,
-    Shoot,
+    TakeFrame,
     TimedAction,
     at,
 )
@@ -114,12 +114,12 @@ class StripesUnit(SceneUnit):
         """Charge, turn the sample to the camera, photograph with rising shutter times."""
         light(session, self.warm_up_s(session))
         charge(session, self.charge_s)
-        offers, scene = session.rig[CAMERA].offers(), self.bracketing
+        capabilities, scene = session.rig[CAMERA].capabilities(), self.bracketing
         at_s, steps = visible_after_s(session.rig) + MARGIN_S, list[TimedAction]()
         for fraction in STRIPES_LADDER:
-            exposure_s = offers.exposure_at_most(scene.longest_s * fraction)
-            steps.append(at(at_s, Shoot(self.role, scene.settings(exposure_s))))
-            at_s += exposure_s + offers.overhead_s + MARGIN_S
+            exposure_s = capabilities.exposure_at_most(scene.longest_s * fraction)
+            steps.append(at(at_s, TakeFrame(self.role, scene.settings(exposure_s))))
+            at_s += exposure_s + capabilities.overhead_s + MARGIN_S
         session.run_sequence([*lights_out(session), *steps])
         face_lamp(session)
 

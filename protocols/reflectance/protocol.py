@@ -19,7 +19,7 @@ from labrig.acquire import (
     SHIELD,
     SHIELD_COVER,
     Session,
-    Shoot,
+    TakeFrame,
     TimedAction,
     at,
 )
@@ -140,15 +140,15 @@ class LitSampleUnit(SceneUnit):
 
     def check(self, session: Session) -> None:
         """Switch the lamp off, and photograph the glow where the sample lies."""
-        offers = session.rig[CAMERA].offers()
+        capabilities = session.rig[CAMERA].capabilities()
         steps: list[TimedAction] = [at(0.0, LAMP_OFF)]
         if SHIELD in session.rig:
             steps.append(at(0.0, SHIELD_COVER))
         at_s = GLOW_FIRST_S
         for step in reversed(range(GLOW_EXPOSURES)):
-            exposure_s = offers.exposure_at_most(self.bracketing.longest_s / LONGER**step)
-            steps.append(at(at_s, Shoot(self.glow_role, self.bracketing.settings(exposure_s))))
-            at_s += exposure_s + offers.overhead_s + MARGIN_S
+            exposure_s = capabilities.exposure_at_most(self.bracketing.longest_s / LONGER**step)
+            steps.append(at(at_s, TakeFrame(self.glow_role, self.bracketing.settings(exposure_s))))
+            at_s += exposure_s + capabilities.overhead_s + MARGIN_S
         session.run_sequence(steps)
 
     def light(self, session: Session) -> None:

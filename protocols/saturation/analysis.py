@@ -51,7 +51,7 @@ from labrig.results import FittedDecay, Measured, Series
 
 BECQUEREL = DECAY_LAWS["becquerel"]
 #: Largest exponent of the shape: that of b = 4.
-LARGEST_SHAPE = 0.75
+MAX_SHAPE = 0.75
 START_SHAPE = 0.3
 #: Parameters of a decay: logarithms of light and rate at lamp off, and offset over its σ.
 OWN = 3
@@ -79,7 +79,7 @@ def compare_levels(curves: Sequence[Curve]) -> OrderTest | None:
         rate = 1 / max(float(lasting[-1]), float(curve.t_s[0]), 1e-9)
         theta += [np.log(brightest), np.log(rate), 0.0]
     low = np.array([0.0, *[-np.inf] * OWN * len(curves)])
-    high = np.array([LARGEST_SHAPE, *[np.inf] * OWN * len(curves)])
+    high = np.array([MAX_SHAPE, *[np.inf] * OWN * len(curves)])
 
     def residuals(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
         parts = [

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import CameraOffers, ManualStep, ProtocolModel, Unit
+from labrig.acquire import CameraCapabilities, ManualStep, ProtocolModel, Unit
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.foundation.region import CENTRE
@@ -165,9 +165,9 @@ class Saturation(ProtocolModel):
             *full[1:],
         ]
 
-    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+    def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
         """Return how the frames of the decays are spaced, in two lines for a plan."""
-        return self._decay(self.charges[0]).frame_spacing(offers)
+        return self._decay(self.charges[0]).frame_spacing(capabilities)
 
     def _decays(self, light: Light) -> list[Unit]:
         metering = f"meter-{light}"

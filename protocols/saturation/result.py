@@ -28,7 +28,7 @@ SIGMAS = 2.0
 LEVEL = 1e-3
 #: Differences in σ from which a kinetic order shows, and largest σ of the shift's exponent with
 #: which its absence is told.
-ORDER_SIGMAS, LARGEST_SHIFT_SIGMA = 3.0, 0.1
+ORDER_SIGMAS, MAX_SHIFT_SIGMA = 3.0, 0.1
 #: Significance level of the test for decays that are not exponential.
 MISFIT_LEVEL = 5e-4
 
@@ -167,7 +167,7 @@ class OrderTest:
     @property
     def verdict(self) -> Literal["first order", "general order", "neither", "not decided"]:
         """Verdict of the rates at lamp off."""
-        if self.shift.sigma > LARGEST_SHIFT_SIGMA:
+        if self.shift.sigma > MAX_SHIFT_SIGMA:
             return "not decided"
         if abs(self.shift.value) < ORDER_SIGMAS * self.shift.sigma:
             return "first order"

@@ -7,10 +7,10 @@ import numpy as np
 
 from labrig.acquire import (
     CAMERA,
-    CameraOffers,
+    CameraCapabilities,
     ExposureSettings,
     Session,
-    Shoot,
+    TakeFrame,
 )
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DeviceError
@@ -55,9 +55,11 @@ class Bracketing:
         """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
-    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+    def dark_exposures_s(self, capabilities: CameraCapabilities) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
-        exposures_s = {offers.exposure_at_most(self.longest_s / LONGER**step) for step in range(3)}
+        exposures_s = {
+            capabilities.exposure_at_most(self.longest_s / LONGER**step) for step in range(3)
+        }
         return [exposure_s for exposure_s in sorted(exposures_s) for _ in range(DARKS_PER_EXPOSURE)]
 
     def photograph(
@@ -81,32 +83,34 @@ class Bracketing:
         DeviceError
             The scene is dark.
         """
-        offers = session.rig[CAMERA].offers()
+        capabilities = session.rig[CAMERA].capabilities()
         self.meter(session, unit)
         # That takes longest: all exposures of a bracket, and the last one as long as it may be.
-        worst_s = offers.exposure_at_most(self.longest_s / LONGER ** (self.exposures - 1))
+        worst_s = capabilities.exposure_at_most(self.longest_s / LONGER ** (self.exposures - 1))
         exposure_s = session.decide(
             "exposure", lambda: self.metered_s(session, unit, lamp, may_be_dark), worst_s
         )
         bracket_s = {
-            offers.exposure_at_most(min(exposure_s * LONGER**step, self.longest_s))
+            capabilities.exposure_at_most(min(exposure_s * LONGER**step, self.longest_s))
             for step in range(self.exposures)
         }
         for each_s in sorted(bracket_s):
             for _ in range(self.repeats):
-                session.perform(Shoot(role, self.settings(each_s)))
+                session.perform(TakeFrame(role, self.settings(each_s)))
 
     def meter(self, session: Session, unit: str) -> None:
         """Photograph the scene with rising exposures until one is bright enough."""
-        for exposure_s in self._ladder(session.rig[CAMERA].offers()):
-            session.perform(Shoot(FrameRole.LOOK, self.settings(exposure_s)))
+        for exposure_s in self._ladder(session.rig[CAMERA].capabilities()):
+            session.perform(TakeFrame(FrameRole.LOOK, self.settings(exposure_s)))
             if session.decide(
                 "bright enough", lambda: self._is_bright_enough(session, unit), when_planned=False
             ):
                 break
 
-    def _ladder(self, offers: CameraOffers) -> Sequence[float]:
-        return sorted({offers.exposure_at_most(self.longest_s * fraction) for fraction in LADDER})
+    def _ladder(self, capabilities: CameraCapabilities) -> Sequence[float]:
+        return sorted(
+            {capabilities.exposure_at_most(self.longest_s * fraction) for fraction in LADDER}
+        )
 
     def _is_bright_enough(self, session: Session, unit: str) -> bool:
         return _measure_brightness(_metering_frames(session, unit)[-1]).fraction > ENOUGH
@@ -130,11 +134,11 @@ class Bracketing:
         DeviceError
             The scene was dark.
         """
-        offers, frames = session.rig[CAMERA].offers(), _metering_frames(session, unit)
+        capabilities, frames = session.rig[CAMERA].capabilities(), _metering_frames(session, unit)
         brightness = [_measure_brightness(frame) for frame in frames]
         detected = [reading for reading in brightness if reading.visible]
         if not detected and may_be_dark:
-            return offers.exposure_at_most(self.longest_s)
+            return capabilities.exposure_at_most(self.longest_s)
         if not detected:
             raise DeviceError(
                 f"{unit}: dark even in {duration_text(frames[-1].exposure_s)}: the {lamp} lamp did "
@@ -146,10 +150,10 @@ class Bracketing:
             session.warn(
                 f"{unit}: even the shortest exposure clips; lower camera.iso or close the aperture"
             )
-            return offers.exposures_s[0]
+            return capabilities.exposures_s[0]
         best = unclipped[-1]
         target_s = best.exposure_s * TARGET / best.fraction
-        return offers.exposure_at_most(min(target_s, self.longest_s))
+        return capabilities.exposure_at_most(min(target_s, self.longest_s))
 
 
 @dataclass(frozen=True)
@@ -191,9 +195,9 @@ class StillDarkUnit:
         """Warm the camera up, then photograph in the dark."""
         session.wait_until_warm("camera")
         scene = self.bracketing
-        exposures_s = scene.dark_exposures_s(session.rig[CAMERA].offers())
+        exposures_s = scene.dark_exposures_s(session.rig[CAMERA].capabilities())
         for exposure_s in exposures_s:
-            session.perform(Shoot(FrameRole.DARK, scene.settings(exposure_s)))
+            session.perform(TakeFrame(FrameRole.DARK, scene.settings(exposure_s)))
         SanityChecks(session, self.name, [CENTRE], None).require_darkness(
             [scene.settings(exposure_s) for exposure_s in sorted(set(exposures_s))]
         )

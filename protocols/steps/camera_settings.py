@@ -5,7 +5,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from labrig.acquire import MAX_STEPS, TOLERANCE_S, CameraOffers
+from labrig.acquire import MAX_STEPS, TOLERANCE_S, CameraCapabilities
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.quantity import duration_text
@@ -28,14 +28,16 @@ def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]
     return [first_s + number * every_s for number in range(int(count) + 1)]
 
 
-def longest_exposure_s(every_s: float, offers: CameraOffers, wanted_s: float = 0.0) -> float:
+def longest_exposure_s(
+    every_s: float, capabilities: CameraCapabilities, wanted_s: float = 0.0
+) -> float:
     """Return the longest offered shutter time that fits between frames `every_s` seconds apart.
 
     Parameters
     ----------
     every_s
         Time in seconds between the begins of two frames.
-    offers
+    capabilities
         Exposure settings that the camera offers.
     wanted_s
         Shutter time in seconds that has to fit in any case.
@@ -46,18 +48,18 @@ def longest_exposure_s(every_s: float, offers: CameraOffers, wanted_s: float = 0
         If `wanted_s`, or even the shortest shutter time, does not fit; the message has the shortest
         time between frames that works.
     """
-    spent_s = offers.overhead_s + MARGIN_S
-    shortest_s = max(wanted_s + offers.overhead_s, offers.exposures_s[0] + spent_s)
+    spent_s = capabilities.overhead_s + MARGIN_S
+    shortest_s = max(wanted_s + capabilities.overhead_s, capabilities.exposures_s[0] + spent_s)
     if every_s + TOLERANCE_S < shortest_s:
         shortest_text = duration_text(math.ceil(10 * (shortest_s - TOLERANCE_S)) / 10)
         exposing = f"an exposure of {duration_text(wanted_s)}" if wanted_s else "any exposure"
         raise ProtocolError(
             f"frames every {duration_text(every_s)} leave no time for {exposing}: from its end to "
-            f"the next one this camera takes {duration_text(offers.overhead_s)} (frame_time), and "
-            f"{duration_text(spent_s)} where settings change; let frames begin at least "
+            f"the next one this camera takes {duration_text(capabilities.overhead_s)} (frame_time), "
+            f"and {duration_text(spent_s)} where settings change; let frames begin at least "
             f"{shortest_text} apart (every: {shortest_text})"
         )
-    return offers.exposure_at_most(max(every_s - spent_s, offers.exposures_s[0]))
+    return capabilities.exposure_at_most(max(every_s - spent_s, capabilities.exposures_s[0]))
 
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
@@ -86,7 +88,7 @@ class CameraSettings(FrozenModel):
     f_number: FNumber | None = 4.0
 
 
-def dark_exposures_s(longest_s: float, offers: CameraOffers) -> list[float]:
+def dark_exposures_s(longest_s: float, capabilities: CameraCapabilities) -> list[float]:
     """Return the shutter time of each dark frame, where later frames take up to `longest_s`."""
-    exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
+    exposures_s = [capabilities.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
     return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]

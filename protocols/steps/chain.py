@@ -5,7 +5,7 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import CameraOffers, PartUnit, ProtocolModel, RigFile, Sample
+from labrig.acquire import CameraCapabilities, PartUnit, ProtocolModel, RigFile, Sample
 from labrig.foundation.plugins import Measurement, measurement
 from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import validate
@@ -84,11 +84,11 @@ class Chain(ProtocolModel):
         ]
         return self.model_copy(update={"parts": tuple(parts)})
 
-    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+    def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
         """Return the parts whose frames are spaced alike, and how, in lines for a plan."""
         parts: dict[tuple[str, ...], list[str]] = {}
         for part in self._links():
-            if lines := tuple(part.protocol.frame_spacing(offers)):
+            if lines := tuple(part.protocol.frame_spacing(capabilities)):
                 parts.setdefault(lines, []).append(part.name)
         return [
             text

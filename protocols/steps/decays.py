@@ -16,10 +16,10 @@ from labrig.acquire import (
     DOOR,
     LAMP_ON,
     SHIELD,
-    CameraOffers,
+    CameraCapabilities,
     RigFile,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     at,
     planned_rig,
@@ -181,29 +181,33 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
         """Return the even begin of each frame in seconds after lamp off."""
         return frame_times_s(self.first_s, self.every, self.duration)
 
-    def longest_exposure_s(self, offers: CameraOffers) -> float:
+    def longest_exposure_s(self, capabilities: CameraCapabilities) -> float:
         """Return the longest offered shutter time that fits between two frames, in seconds."""
         if isinstance(self.exposure, str):
-            longest_s = longest_exposure_s(self.every, offers)
+            longest_s = longest_exposure_s(self.every, capabilities)
             if self.spacing == "even" or self.exposure == "grow":
                 return longest_s
-            return min(self._random_spacing(offers).longest_exposure_s(offers), longest_s)
-        return longest_exposure_s(self.every, offers, offers.exposure_near(self.exposure))
+            return min(
+                self._random_spacing(capabilities).longest_exposure_s(capabilities), longest_s
+            )
+        return longest_exposure_s(
+            self.every, capabilities, capabilities.exposure_near(self.exposure)
+        )
 
-    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+    def dark_exposures_s(self, capabilities: CameraCapabilities) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
         if isinstance(self.exposure, float):
-            return [offers.exposure_near(self.exposure)] * DARKS_PER_EXPOSURE
-        return dark_exposures_s(self.longest_exposure_s(offers), offers)
+            return [capabilities.exposure_near(self.exposure)] * DARKS_PER_EXPOSURE
+        return dark_exposures_s(self.longest_exposure_s(capabilities), capabilities)
 
-    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+    def meter_ladder(self, capabilities: CameraCapabilities) -> list[tuple[float, float]]:
         """Return begin and shutter time of each metering frame; for `grow`, along the decay."""
         until_s = self.duration if self.exposure == "grow" else 0.0
-        return ladder(self.first_s, self.longest_exposure_s(offers), offers, until_s)
+        return ladder(self.first_s, self.longest_exposure_s(capabilities), capabilities, until_s)
 
     def schedule(
         self,
-        offers: CameraOffers,
+        capabilities: CameraCapabilities,
         metering: Sequence[MeteringFrame],
         warn: Callable[[str], None],
         seed: int,
@@ -214,45 +218,45 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
         """
         times_s = self.frame_times_s()
         if isinstance(self.exposure, float):
-            exposure_s = offers.exposure_near(self.exposure)
-            return self._spaced(Schedule.constant(times_s, exposure_s), offers, seed)
+            exposure_s = capabilities.exposure_near(self.exposure)
+            return self._spaced(Schedule.constant(times_s, exposure_s), capabilities, seed)
         growth = self.grow_at_most if self.exposure == "grow" else 1.0
-        longest_s = self.longest_exposure_s(offers)
+        longest_s = self.longest_exposure_s(capabilities)
         meter = DecayMeter(metering)
-        even = meter.schedule(times_s, offers, longest_s, growth, warn)
-        spaced = self._spaced(even, offers, seed)
+        even = meter.schedule(times_s, capabilities, longest_s, growth, warn)
+        spaced = self._spaced(even, capabilities, seed)
         # A frame that begins earlier than the even one is brighter.
-        own = meter.schedule(spaced.times_s, offers, longest_s, growth, lambda text: None)
+        own = meter.schedule(spaced.times_s, capabilities, longest_s, growth, lambda text: None)
         exposures_s = map(min, spaced.exposures_s, own.exposures_s)
         return Schedule(spaced.times_s, tuple(exposures_s))
 
-    def _spaced(self, even: Schedule, offers: CameraOffers, seed: int) -> Schedule:
+    def _spaced(self, even: Schedule, capabilities: CameraCapabilities, seed: int) -> Schedule:
         """Return the frames of an even schedule at the begins that they have in the end."""
         if self.spacing == "even":
             return even
-        spacing = self._random_spacing(offers)
+        spacing = self._random_spacing(capabilities)
         return replace(even, times_s=tuple(spacing.begins_s(even.times_s, even.exposures_s, seed)))
 
-    def _random_spacing(self, offers: CameraOffers) -> RandomSpacing:
-        return RandomSpacing(self.every, offers.overhead_s + MARGIN_S)
+    def _random_spacing(self, capabilities: CameraCapabilities) -> RandomSpacing:
+        return RandomSpacing(self.every, capabilities.overhead_s + MARGIN_S)
 
-    def assumed_schedule(self, offers: CameraOffers, seed: int) -> Schedule:
+    def assumed_schedule(self, capabilities: CameraCapabilities, seed: int) -> Schedule:
         """Return the schedule of a plan, which has metered nothing: the longest exposures.
 
         With `exposure: grow` they are those of a glow that fades evenly, by `grow_at_most`.
         """
-        times_s, longest_s = self.frame_times_s(), self.longest_exposure_s(offers)
+        times_s, longest_s = self.frame_times_s(), self.longest_exposure_s(capabilities)
         growth = self.grow_at_most if self.exposure == "grow" else 1.0
         fading_s = times_s[-1] - times_s[0]
         exposures_s = (
-            offers.exposure_at_most(longest_s * growth ** ((time_s - times_s[-1]) / fading_s))
+            capabilities.exposure_at_most(longest_s * growth ** ((time_s - times_s[-1]) / fading_s))
             for time_s in times_s
         )
-        return self._spaced(Schedule(tuple(times_s), tuple(exposures_s)), offers, seed)
+        return self._spaced(Schedule(tuple(times_s), tuple(exposures_s)), capabilities, seed)
 
     def expected_schedule(
         self,
-        offers: CameraOffers,
+        capabilities: CameraCapabilities,
         expected: Callable[[float, float], Sequence[FrameMeasurement]],
         warn: Callable[[str], None],
     ) -> Schedule:
@@ -260,7 +264,7 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
 
         Parameters
         ----------
-        offers
+        capabilities
             Exposure settings that the camera offers.
         expected
             Function that predicts a frame of the glow in each patch, from its begin after lamp off
@@ -268,8 +272,8 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
         warn
             Function that receives warnings.
         """
-        metering = [MeteringFrame(*at, expected(*at)) for at in self.meter_ladder(offers)]
-        return self.schedule(offers, metering, warn, PLANNED_SEED)
+        metering = [MeteringFrame(*at, expected(*at)) for at in self.meter_ladder(capabilities)]
+        return self.schedule(capabilities, metering, warn, PLANNED_SEED)
 
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
         """Return the sanity checks of a unit's frames, compared with those of `metering`."""
@@ -288,12 +292,12 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
             "file a shorter 'warm_up'",
         )
 
-    def frame_spacing(self, offers: CameraOffers) -> Sequence[str]:
+    def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
         """Return how the frames of a decay are spaced, in two lines for a plan."""
-        spacing = self._random_spacing(offers)
-        exposure_s = self.longest_exposure_s(offers)
+        spacing = self._random_spacing(capabilities)
+        exposure_s = self.longest_exposure_s(capabilities)
         if isinstance(self.exposure, float):
-            exposure_s = offers.exposure_near(self.exposure)
+            exposure_s = capabilities.exposure_near(self.exposure)
         if self.spacing == "even" or not spacing.free_s(exposure_s):
             return spacing.even_lines(exposure_s)
         return spacing.lines(exposure_s, len(self.frame_times_s()))
@@ -328,7 +332,7 @@ class DecayUnit:
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot(FrameRole.DECAY, self.protocol.settings(exposure_s)))
+                    at(time_s, TakeFrame(FrameRole.DECAY, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in schedule.frames()
                 ),
             ]
@@ -338,7 +342,7 @@ class DecayUnit:
         checks.require_decay(self.protocol.short_settings(session))
 
     def _schedule(self, session: Session) -> Schedule:
-        protocol, offers = self.protocol, session.rig[CAMERA].offers()
+        protocol, capabilities = self.protocol, session.rig[CAMERA].capabilities()
         regions = list(protocol.patches.values())
         seed = session.seed("begins of frames") if protocol.spacing == "random" else 0
 
@@ -347,11 +351,11 @@ class DecayUnit:
                 frame for frame in session.frames(FrameRole.METER) if frame.unit == self.metering
             ]
             metering = [measure_frame(frame, regions) for frame in frames]
-            return protocol.schedule(offers, metering, session.warn, seed)
+            return protocol.schedule(capabilities, metering, session.warn, seed)
 
         if isinstance(protocol.exposure, float):
-            return protocol.schedule(offers, [], session.warn, seed)
-        return session.decide("exposure", decide, protocol.assumed_schedule(offers, seed))
+            return protocol.schedule(capabilities, [], session.warn, seed)
+        return session.decide("exposure", decide, protocol.assumed_schedule(capabilities, seed))
 
     def _charge(self, session: Session, exposure_s: float) -> None:
         if isinstance(self.protocol.charge, float):
@@ -361,7 +365,7 @@ class DecayUnit:
         self.protocol.charge_sample(session, rule.check_every)
         charged_s = rule.check_every
         while charged_s < rule.at_most:
-            shoot = Shoot(DecayFrames.PLATEAU, self.protocol.settings(exposure_s))
+            shoot = TakeFrame(DecayFrames.PLATEAU, self.protocol.settings(exposure_s))
             session.run_sequence([*lights_out(session), at(self.protocol.first_s, shoot)])
             face_lamp(session)
             session.perform(LAMP_ON)
@@ -407,13 +411,13 @@ class DaylightUnit:
         if has_door(session):
             session.warn("no daylight photograph: behind a door the lamp lights the sample unseen")
             return
-        offers = session.rig[CAMERA].offers()
+        capabilities = session.rig[CAMERA].capabilities()
         session.perform(LAMP_ON)
         session.wait(LAMP_SETTLES_S, "lamp settles")
         under_lamp = [
-            self.protocol.settings(offers.exposure_at_most(nominal_s))
+            self.protocol.settings(capabilities.exposure_at_most(nominal_s))
             for nominal_s in DAYLIGHT_EXPOSURES_S
         ]
         for settings in under_lamp:
-            session.perform(Shoot(FrameRole.DAYLIGHT, settings))
+            session.perform(TakeFrame(FrameRole.DAYLIGHT, settings))
         self.protocol.checks(session, self.name).switch_off(under_lamp)

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from labrig.acquire import CameraOffers
+from labrig.acquire import CameraCapabilities
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.quantity import duration_text
@@ -115,7 +115,7 @@ class DecayMeter:
     def schedule(
         self,
         times_s: Sequence[float],
-        offers: CameraOffers,
+        capabilities: CameraCapabilities,
         longest_s: float,
         growth: float,
         warn: Callable[[str], None],
@@ -126,7 +126,7 @@ class DecayMeter:
         ----------
         times_s
             Begin of each frame in seconds after lamp off.
-        offers
+        capabilities
             Exposure settings that the camera offers.
         longest_s
             Longest shutter time in seconds.
@@ -138,17 +138,17 @@ class DecayMeter:
         if not self._readings:
             if self._shortest_clipped:
                 warn("even the shortest exposure clips; lower camera.iso or close the aperture")
-                return Schedule.constant(times_s, offers.exposures_s[0])
+                return Schedule.constant(times_s, capabilities.exposures_s[0])
             warn("no glow was seen while metering; raise camera.iso or open the aperture")
             return Schedule.constant(times_s, longest_s)
         rates = self._peak_rates(np.asarray(times_s) - times_s[0])
         target_s = TARGET * self._range_dn / rates
-        first_s = offers.exposure_at_most(min(float(target_s[0]), longest_s))
+        first_s = capabilities.exposure_at_most(min(float(target_s[0]), longest_s))
         if rates[0] * first_s < DIM * self._range_dn:
             warn("the glow is very dim at these settings; raise camera.iso or open the aperture")
         limit_s = min(first_s * growth, longest_s)
         exposures_s = (
-            max(first_s, offers.exposure_at_most(min(float(exposure_s), limit_s)))
+            max(first_s, capabilities.exposure_at_most(min(float(exposure_s), limit_s)))
             for exposure_s in target_s
         )
         return Schedule(tuple(times_s), tuple(exposures_s))

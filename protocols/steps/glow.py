@@ -9,7 +9,15 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, ProtocolModel, Session, Shoot, at
+from labrig.acquire import (
+    CAMERA,
+    CameraCapabilities,
+    ExposureSettings,
+    ProtocolModel,
+    Session,
+    TakeFrame,
+    at,
+)
 from labrig.foundation.quantity import DurationS, duration_text
 from labrig.foundation.region import Region
 from labrig.record import FrameRole
@@ -41,11 +49,11 @@ class MeteredSettings(ProtocolModel):
     camera: CameraSettings = CameraSettings()
 
     @abstractmethod
-    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+    def meter_ladder(self, capabilities: CameraCapabilities) -> list[tuple[float, float]]:
         """Return begin after lamp off and shutter time of each metering frame."""
 
     @abstractmethod
-    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+    def dark_exposures_s(self, capabilities: CameraCapabilities) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
 
     @abstractmethod
@@ -58,7 +66,7 @@ class MeteredSettings(ProtocolModel):
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
         """Return the settings of the shortest metering frames, for a check of clipped frames."""
-        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
+        ladder = self.meter_ladder(session.rig[CAMERA].capabilities())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
@@ -69,7 +77,7 @@ class MeteredSettings(ProtocolModel):
 def ladder(
     first_s: float,
     longest_s: float,
-    offers: CameraOffers,
+    capabilities: CameraCapabilities,
     until_s: float = 0.0,
     later: Sequence[float] = LATER,
 ) -> list[tuple[float, float]]:
@@ -81,7 +89,7 @@ def ladder(
         Begin of the first frame after lamp off in seconds.
     longest_s
         Longest shutter time in seconds.
-    offers
+    capabilities
         Exposure settings that the camera offers.
     until_s
         Time after lamp off in seconds until which further frames begin, each group of them half as
@@ -93,9 +101,9 @@ def ladder(
     at_s, fractions = first_s, LADDER
     while not frames or at_s < until_s:
         for fraction in fractions:
-            exposure_s = offers.exposure_at_most(longest_s * fraction)
+            exposure_s = capabilities.exposure_at_most(longest_s * fraction)
             frames.append((at_s, exposure_s))
-            at_s += exposure_s + offers.overhead_s + MARGIN_S
+            at_s += exposure_s + capabilities.overhead_s + MARGIN_S
         at_s, fractions = at_s * 1.5, tuple(later)
     return frames
 
@@ -142,37 +150,42 @@ class GlowSettings(MeteredChargeSettings):
     def regions(self) -> Sequence[Region]:
         """Return the regions of the glow; the brightest decides."""
 
-    def longest_exposures_s(self, offers: CameraOffers) -> list[float]:
+    def longest_exposures_s(self, capabilities: CameraCapabilities) -> list[float]:
         """Return the longest shutter time of each frame, which ends before the next begins."""
-        longest_s = offers.exposure_at_most(self.longest)
+        longest_s = capabilities.exposure_at_most(self.longest)
         between_s = [
-            longest_exposure_s(later - earlier, offers)
+            longest_exposure_s(later - earlier, capabilities)
             for earlier, later in pairwise(self.times_s())
         ]
         return [min(limit_s, longest_s) for limit_s in (*between_s, longest_s)]
 
-    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+    def dark_exposures_s(self, capabilities: CameraCapabilities) -> list[float]:
         """Return the shutter time of each dark frame in seconds."""
-        return dark_exposures_s(max(self.longest_exposures_s(offers)), offers)
+        return dark_exposures_s(max(self.longest_exposures_s(capabilities)), capabilities)
 
-    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+    def meter_ladder(self, capabilities: CameraCapabilities) -> list[tuple[float, float]]:
         """Return begin and shutter time of each metering frame, to the last frame of the glow."""
-        longest_s, times_s = max(self.longest_exposures_s(offers)), self.times_s()
-        return ladder(times_s[0], longest_s, offers, until_s=times_s[-1])
+        longest_s, times_s = max(self.longest_exposures_s(capabilities)), self.times_s()
+        return ladder(times_s[0], longest_s, capabilities, until_s=times_s[-1])
 
     def schedule(
-        self, offers: CameraOffers, measured: Sequence[MeteringFrame], warn: Callable[[str], None]
+        self,
+        capabilities: CameraCapabilities,
+        measured: Sequence[MeteringFrame],
+        warn: Callable[[str], None],
     ) -> Schedule:
         """Return frames of the glow, as bright as the metering frames allow."""
-        limits_s = self.longest_exposures_s(offers)
+        limits_s = self.longest_exposures_s(capabilities)
         times_s = self.times_s()
-        wished = DecayMeter(measured).schedule(times_s, offers, max(limits_s), float("inf"), warn)
+        wished = DecayMeter(measured).schedule(
+            times_s, capabilities, max(limits_s), float("inf"), warn
+        )
         exposures_s = map(min, wished.exposures_s, limits_s)
         return Schedule(tuple(times_s), tuple(exposures_s))
 
-    def brightest_schedule(self, offers: CameraOffers) -> Schedule:
+    def brightest_schedule(self, capabilities: CameraCapabilities) -> Schedule:
         """Return the schedule with the longest exposures that `schedule` can return."""
-        return Schedule(tuple(self.times_s()), tuple(self.longest_exposures_s(offers)))
+        return Schedule(tuple(self.times_s()), tuple(self.longest_exposures_s(capabilities)))
 
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
         """Return the sanity checks of a unit's frames, compared with those of `metering`."""
@@ -181,14 +194,14 @@ class GlowSettings(MeteredChargeSettings):
 
 def metered_schedule(session: Session, protocol: GlowSettings, metering: str) -> Schedule:
     """Return the schedule of the glow, from the frames of the unit `metering`."""
-    offers = session.rig[CAMERA].offers()
+    capabilities = session.rig[CAMERA].capabilities()
 
     def decide() -> Schedule:
         frames = [frame for frame in session.frames(FrameRole.METER) if frame.unit == metering]
         measured = [measure_frame(frame, protocol.regions()) for frame in frames]
-        return protocol.schedule(offers, measured, session.warn)
+        return protocol.schedule(capabilities, measured, session.warn)
 
-    return session.decide("exposure", decide, protocol.brightest_schedule(offers))
+    return session.decide("exposure", decide, protocol.brightest_schedule(capabilities))
 
 
 #: Interval of checks of the sample, and longest rest.
@@ -222,7 +235,7 @@ def dark_frames(
         longest = max(exposures, key=lambda settings: settings.exposure_s)
         _rest_until_dark(session, unit, regions, longest)
     for settings in exposures:
-        session.perform(Shoot(FrameRole.DARK, settings))
+        session.perform(TakeFrame(FrameRole.DARK, settings))
 
 
 def _rest_until_dark(
@@ -230,7 +243,7 @@ def _rest_until_dark(
 ) -> None:
     """Rest until the sample is as dark as the closed door; the door is open afterwards."""
     face_lamp(session)
-    session.perform(Shoot(FrameRole.REST, longest))
+    session.perform(TakeFrame(FrameRole.REST, longest))
     face_camera(session)
     previous, rested_s = np.inf, 0.0
     while True:
@@ -261,10 +274,10 @@ def _look(
     Returns the fraction of the range by which the longest exposure exceeds the closed door, or 0;
     more than 1 if it clips.
     """
-    offers, least = session.rig[CAMERA].offers(), 0.0
+    capabilities, least = session.rig[CAMERA].capabilities(), 0.0
     for fraction in LADDER[::-1]:
-        exposure_s = offers.exposure_at_most(longest.exposure_s * fraction)
-        session.perform(Shoot(FrameRole.REST, replace(longest, exposure_s=exposure_s)))
+        exposure_s = capabilities.exposure_at_most(longest.exposure_s * fraction)
+        session.perform(TakeFrame(FrameRole.REST, replace(longest, exposure_s=exposure_s)))
         light = session.decide(
             "light before", lambda: _light(session, unit, regions), when_planned=0.0
         )
@@ -302,7 +315,7 @@ class DarkUnit:
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph in the dark."""
         session.wait_until_warm("camera")
-        exposures_s = self.protocol.dark_exposures_s(session.rig[CAMERA].offers())
+        exposures_s = self.protocol.dark_exposures_s(session.rig[CAMERA].capabilities())
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
         checks = self.protocol.checks(session, self.name)
         dark_frames(session, self.name, checks.patches, exposures)
@@ -324,13 +337,13 @@ class MeterUnit:
             self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
         else:
             charge(session, self.protocol.meter)
-        ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
+        ladder = self.protocol.meter_ladder(session.rig[CAMERA].capabilities())
         check_visible(session, ladder[0][0])
         session.run_sequence(
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot(FrameRole.METER, self.protocol.settings(exposure_s)))
+                    at(time_s, TakeFrame(FrameRole.METER, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in ladder
                 ),
             ]

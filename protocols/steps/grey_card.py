@@ -7,10 +7,10 @@ from labrig.acquire import (
     CAMERA,
     LAMP,
     LAMP_ON,
-    CameraOffers,
+    CameraCapabilities,
     ExposureSettings,
     Session,
-    Shoot,
+    TakeFrame,
 )
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DeviceError
@@ -60,13 +60,13 @@ class CardDarkUnit:
     def run(self, session: Session) -> None:
         """Photograph at the shortest and the longest exposure, and check that it is dark."""
         session.wait_until_warm("camera")
-        offers = session.rig[CAMERA].offers()
-        longest_s = offers.exposure_at_most(self.longest_s)
-        for exposure_s in (offers.exposures_s[0], longest_s):
+        capabilities = session.rig[CAMERA].capabilities()
+        longest_s = capabilities.exposure_at_most(self.longest_s)
+        for exposure_s in (capabilities.exposures_s[0], longest_s):
             shot = ExposureSettings(exposure_s, self.iso, self.reference.f_number)
             for _ in range(DARKS_EACH):
-                session.perform(Shoot(FrameRole.DARK, shot))
-        shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
+                session.perform(TakeFrame(FrameRole.DARK, shot))
+        shorter = [replace(shot, exposure_s=time_s) for time_s in capabilities.exposures_s[:3]]
         SanityChecks(session, self.name, [self.card], None).require_darkness(shorter)
 
 
@@ -96,10 +96,10 @@ class CardLight:
         return fraction / (self.per_s * gain)
 
     def exposed(
-        self, fraction: float, settings: ExposureSettings, offers: CameraOffers
+        self, fraction: float, settings: ExposureSettings, capabilities: CameraCapabilities
     ) -> ExposureSettings:
         """Return `settings` with the longest offered shutter time within that fraction."""
-        exposure_s = offers.exposure_at_most(self.exposure_s(fraction, settings))
+        exposure_s = capabilities.exposure_at_most(self.exposure_s(fraction, settings))
         return ExposureSettings(exposure_s, settings.iso, settings.f_number)
 
 
@@ -115,11 +115,11 @@ class CardMeterUnit:
         """Light the card, photograph it, refuse one that is not lit."""
         session.wait_until_warm("camera")
         light_card(session)
-        offers = session.rig[CAMERA].offers()
+        capabilities = session.rig[CAMERA].capabilities()
         for nominal_s in METERED_S:
-            exposure_s = offers.exposure_at_most(nominal_s)
+            exposure_s = capabilities.exposure_at_most(nominal_s)
             shot = ExposureSettings(exposure_s, self.settings.iso, self.settings.f_number)
-            session.perform(Shoot(FrameRole.METER, shot))
+            session.perform(TakeFrame(FrameRole.METER, shot))
         card_light(session, self.settings, self.card)
 
 

@@ -17,7 +17,7 @@ from labrig.acquire import (
     LedSwitch,
     ProtocolModel,
     Session,
-    Shoot,
+    TakeFrame,
 )
 from labrig.foundation.quantity import Count, DurationS
 
@@ -141,7 +141,7 @@ class LitUnit(ABC):
         settings = self.bracketing.settings(
             session.decide("exposure off", lambda: self._longest_s(session), self._worst_s)
         )
-        session.perform(Shoot(self.off_role, settings))
+        session.perform(TakeFrame(self.off_role, settings))
 
     @property
     def _worst_s(self) -> float:

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from labrig.acquire import CameraOffers
+from labrig.acquire import CameraCapabilities
 from labrig.foundation.quantity import duration_text
 
 #: Spacing of the begins of photographs.
@@ -47,9 +47,9 @@ class RandomSpacing:
     every_s: float
     spent_s: float
 
-    def longest_exposure_s(self, offers: CameraOffers) -> float:
+    def longest_exposure_s(self, capabilities: CameraCapabilities) -> float:
         """Return the longest shutter time with which enough is left to chance, in seconds."""
-        return offers.exposure_at_most(EXPOSED * (self.every_s - self.spent_s))
+        return capabilities.exposure_at_most(EXPOSED * (self.every_s - self.spent_s))
 
     def free_s(self, exposure_s: float) -> float:
         """Return the mean time in seconds between two begins that is left to chance."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.acquire import LAMP_OFF, ExposureSettings, Session, Shoot, at
+from labrig.acquire import LAMP_OFF, ExposureSettings, Session, TakeFrame, at
 from labrig.foundation.errors import DeviceError
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.region import Region
@@ -157,7 +157,7 @@ class SanityChecks:
             )
 
         compared = self.session.decide("frame to compare with", longest_open, under_lamp[-1])
-        look_again = Shoot(FrameRole.LOOK, compared)
+        look_again = TakeFrame(FrameRole.LOOK, compared)
         self.session.run_sequence([at(0.0, LAMP_OFF), at(LAMP_GONE_S, look_again)])
         if not self.session.decide("lamp has gone out", gone_out, when_planned=True):
             raise DeviceError(
@@ -216,7 +216,7 @@ class SanityChecks:
 
     def _shoot(self, settings: Sequence[ExposureSettings]) -> None:
         for exposure in settings:
-            self.session.perform(Shoot(FrameRole.LOOK, exposure))
+            self.session.perform(TakeFrame(FrameRole.LOOK, exposure))
 
     def _unit_frames(self, role: str) -> list[FrameRecord]:
         return [frame for frame in self.session.frames(role) if frame.unit == self.unit]

@@ -36,7 +36,7 @@ from tests.quick_yaml import read_quickly, write_quickly
 
 #: Albedo of all samples: a blue paint's.
 BLUE = {300: 0.35, 420: 0.45, 460: 0.6, 500: 0.35, 560: 0.15, 620: 0.12, 680: 0.2, 780: 0.4}
-MOST_PERCENT, MOST_SIGMAS, MOST_DELTA_E, WORSE = 3.0, 3.0, 2.0, 2.0
+MAX_PERCENT, MAX_SIGMAS, MAX_DELTA_E, WORSE = 3.0, 3.0, 2.0, 2.0
 
 
 @dataclass(frozen=True)
@@ -138,9 +138,7 @@ def is_right(case: Case, patch: RenderedPatch) -> bool:
     sigmas = np.abs(patch.ratio.in_sigma("measured")).max()
     mean = patch.each.mean("measured")
     is_better = case.is_one_state or patch.each.mean("1 state") >= WORSE * mean
-    return bool(
-        off <= MOST_PERCENT and sigmas <= MOST_SIGMAS and mean <= MOST_DELTA_E and is_better
-    )
+    return bool(off <= MAX_PERCENT and sigmas <= MAX_SIGMAS and mean <= MAX_DELTA_E and is_better)
 
 
 def told(case: Case, folder: Path) -> bool:

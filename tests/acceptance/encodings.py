@@ -24,7 +24,7 @@ from pathlib import Path
 
 from labrig.foundation import resources
 
-LONGEST_S = 900.0
+MAX_S = 900.0
 SERVES_S = 20.0
 
 ENCODINGS: Mapping[str, tuple[str, Mapping[str, str]]] = {
@@ -140,7 +140,7 @@ def ended(
             printed += piece
         passed_s = time.monotonic() - begun_s
         is_served = b"http://" in printed or passed_s > SERVES_S
-        if (command.serves and is_served and not told) or passed_s > LONGEST_S:
+        if (command.serves and is_served and not told) or passed_s > MAX_S:
             process.send_signal(signal.SIGTERM)
             told = True
     os.close(ours)

@@ -27,7 +27,7 @@ from labrig.optics import SLICES, Strip
 from labrig.protocols.excitation.analysis.closure import predicted_charging
 from labrig.protocols.excitation.analysis.lamp_light import (
     LAMP_SIGMA,
-    LARGEST_FACTOR,
+    MAX_FACTOR,
     light_scatter,
     mode_kinds,
     scale_sigma,
@@ -166,7 +166,7 @@ def measured(case: Case, material: str, seed: int) -> Outcome:
     series = charging(bench, case, file)
     sigmas = RelativeSigmas(
         flicker=bench.flicker, lamp=LAMP_SIGMA, cold_deficit=0.005, offset=DARK,
-        common_mode=DARK, scale=scale_sigma(file), largest_factor=LARGEST_FACTOR,
+        common_mode=DARK, scale=scale_sigma(file), largest_factor=MAX_FACTOR,
     )  # fmt: skip
     fit = fitted(bench, sigmas, series)
     closure = predicted_charging(series, sigmas, lambda one: fitted(bench, sigmas, one, fit))

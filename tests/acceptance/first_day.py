@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from math import exp
 from pathlib import Path
 
-LONGEST_S = 60.0
+MAX_S = 60.0
 
 DECAY = "protocol: decay\nsample: {name: paint}\ncharge: 5 min\nfor: 60 s\n"
 TIMES_S = range(0, 60, 2)
@@ -190,10 +190,10 @@ def answer(labrig: str, mistake: Mistake) -> Answer:
                 capture_output=True,
                 text=True,
                 stdin=subprocess.DEVNULL,
-                timeout=LONGEST_S,
+                timeout=MAX_S,
             )
         except subprocess.TimeoutExpired:
-            return Answer(f"nothing within {LONGEST_S:.0f} s", -1, LONGEST_S, 0)
+            return Answer(f"nothing within {MAX_S:.0f} s", -1, MAX_S, 0)
         duration_s = time.perf_counter() - start_s
     finally:
         shutil.rmtree(folder)

@@ -34,7 +34,7 @@ from labrig.process import process_run
 from tests.acceptance.mixture_colours import FOLDER
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 
-MOST_SIGMAS, MOST_TIMES, DARK = 4.0, 2.0, 0.02
+MAX_SIGMAS, MAX_TIMES, DARK = 4.0, 2.0, 0.02
 REFLECTED, SHARE = "delta_e_reflected", "reradiated_luminance"
 TEXTILES = {"yellow": "TEXTYELL", "red": "HERPICER", "ball": "GOLF", "green": "POLGREE"}
 PAPERS = {"red": "PAPRED", "blue": "TEXTBLUE", "yellow": "POLYYELL", "photo": "PFUJIWH"}
@@ -158,7 +158,7 @@ def _room(case: Case, leds: Path | None = None) -> Callable[[dict[str, Any]], No
 def is_right(compared: LampsComparison) -> bool:
     """Return whether photographs and renderings agree."""
     return all(
-        _furthest(lamp) <= MOST_SIGMAS and _mean(lamp, "delta_e") <= MOST_TIMES * _alone(lamp)
+        _furthest(lamp) <= MAX_SIGMAS and _mean(lamp, "delta_e") <= MAX_TIMES * _alone(lamp)
         for lamp in compared.lamps
     )
 

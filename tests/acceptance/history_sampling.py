@@ -41,7 +41,7 @@ PERIOD_S, HALF_BLADE, PENUMBRA = 4.0, math.radians(60), math.radians(10)
 FRAME_S, TIMES_S = 0.04, (1.0, 10.0, 100.0, 1000.0)
 SPEED = 2 * math.pi / PERIOD_S
 REFERENCE_STEPS, CHECKED = 100_000, 512
-MOST_SAMPLES = 2**17
+MAX_SAMPLES = 2**17
 #: Materials of one state and of two, which decay slowly and fast.
 MATERIALS = ("blue-paint", "yellow-paint", "double-wide")
 #: Largest κ/k: light so weak that the law without saturation holds, and light of 0.5 %.
@@ -193,7 +193,7 @@ def equal_quality(
     """Return how many stratified samples have at most an error; None if none have."""
     some = Scene(scene.angle[checked], scene.k_per_s, scene.kappa_per_s, scene.emitted)
     n = 1
-    while n <= MOST_SAMPLES:
+    while n <= MAX_SAMPLES:
         if rms_percent(some.history(t_s, n, n, stratified=True), truth) <= percent:
             return n
         n *= 2
@@ -225,7 +225,7 @@ def compare(name: str, saturation: float, size: int, seed: int) -> None:
         truth = scene.truth(t_s, checked)
         own = rms_percent(glow[checked], truth)
         some = Scene(angle[checked], scene.k_per_s, scene.kappa_per_s, scene.emitted)
-        limit = some.history(t_s, MOST_SAMPLES, 1, stratified=True)
+        limit = some.history(t_s, MAX_SAMPLES, 1, stratified=True)
         row = f"{t_s:6g}{truth.mean():12.4g}{own:9.4f}{rms_percent(limit, truth):9.4f}"
         frames = round(t_s / FRAME_S)
         for equal_s in (frame_s, frames * frame_s):
@@ -252,7 +252,7 @@ def tell_saturation(name: str) -> None:
     for saturation in SATURATIONS:
         scene = Scene.of(name, saturation, angle[:CHECKED])
         truth = scene.truth(SATURATED_S, np.arange(CHECKED)).mean()
-        law = scene.history(SATURATED_S, MOST_SAMPLES // 8, 1, stratified=True).mean()
+        law = scene.history(SATURATED_S, MAX_SAMPLES // 8, 1, stratified=True).mean()
         (glow,), _ = stepped(scene, (SATURATED_S,))
         print(f"{saturation:12g}{law / truth:12.4f}{glow.mean() / truth:14.5f}")
 

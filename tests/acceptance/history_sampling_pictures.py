@@ -11,7 +11,7 @@ from labrig.report.figure_style import CHANNEL, DASHED, INK, MUTED, OTHER_CHANNE
 from tests.acceptance.history_sampling import (
     CHECKED,
     FRAME_S,
-    MOST_SAMPLES,
+    MAX_SAMPLES,
     Scene,
     disk,
     equal_quality,
@@ -108,7 +108,7 @@ def _draw_effort(axes: "Axes", names: Sequence[str], saturation: float) -> None:
             at_s = round(t_s / FRAME_S) * FRAME_S
             truth = scene.truth(at_s, whole)
             n = equal_quality(scene, at_s, whole, truth, rms_percent(glow, truth))
-            found.append(MOST_SAMPLES if n is None else n)
+            found.append(MAX_SAMPLES if n is None else n)
         axes.loglog(times_s, found, "o-", color=colour, markersize=3.5,
                     label=f"history, stratified: {name}")  # fmt: skip
     axes.loglog(times_s, np.ones(len(times_s)), color=INK, label="field")

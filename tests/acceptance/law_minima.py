@@ -32,7 +32,7 @@ from tests.fit import truths
 
 #: Differences of χ² that are counted.
 FAR, NEAR = 9.0, 1e-3
-GRID, STARTS, LARGEST_SHAPE = (40, 9), 10, 3.0
+GRID, STARTS, MAX_SHAPE = (40, 9), 10, 3.0
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def lowest_chi2(table: Table, law: str, reference_s: float) -> float:
     places = [
         (log_rate, shape)
         for log_rate in np.linspace(*rates, GRID[0])
-        for shape in np.linspace(least, min(largest, LARGEST_SHAPE), GRID[1])
+        for shape in np.linspace(least, min(largest, MAX_SHAPE), GRID[1])
     ]
     chi2 = [float(np.sum(residuals(np.array(place)) ** 2)) for place in places]
     ends = []

@@ -26,7 +26,7 @@ from labrig.calibration import PatchReflectance
 from labrig.fit.excitation import RelativeSigmas, layer_effect
 from labrig.foundation.arrays import FloatArray
 from labrig.material import read_material
-from labrig.protocols.excitation.analysis.lamp_light import LAMP_SIGMA, LARGEST_FACTOR, scale_sigma
+from labrig.protocols.excitation.analysis.lamp_light import LAMP_SIGMA, MAX_FACTOR, scale_sigma
 from labrig.protocols.excitation.analysis.material import largest_density
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.phosphor import phosphor
@@ -91,7 +91,7 @@ def outcome(bench: Bench, seed: int, reflectance: PatchReflectance | None = None
     series = charging(bench, case, file)
     sigmas = RelativeSigmas(
         flicker=bench.flicker, lamp=LAMP_SIGMA, cold_deficit=0.005, offset=DARK,
-        common_mode=DARK, scale=scale_sigma(file), largest_factor=LARGEST_FACTOR,
+        common_mode=DARK, scale=scale_sigma(file), largest_factor=MAX_FACTOR,
     )  # fmt: skip
     fit = fitted(bench, sigmas, series)
     limit, basis = largest_density(file.bands_nm, None, reflectance)

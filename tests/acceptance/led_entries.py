@@ -20,7 +20,7 @@ from labrig.optics import read_camera
 from tests.acceptance.led_matrices import (
     CAMERA,
     CASES,
-    LEAST_FRACTION,
+    MIN_FRACTION,
     Photographs,
     told_system,
 )
@@ -37,7 +37,7 @@ PAIRED, STRENGTH = 0.3, (0.1, 0.5)
 def papers(count: int, rng: np.random.Generator) -> list[ReradiationMatrix]:
     """Return some of the measured matrices that re-radiate, with σ."""
     measured = [read_reradiation(path) for path in matrix_files(SHARED / "bispectral/rit_bfc450")]
-    strong = [each for each in measured if each.reradiated_fraction.max() > LEAST_FRACTION]
+    strong = [each for each in measured if each.reradiated_fraction.max() > MIN_FRACTION]
     chosen = [corrected(strong[k]) for k in rng.permutation(len(strong))[:count]]
     return [
         ReradiationMatrix(

@@ -45,7 +45,7 @@ from labrig.optics import read_light
 from labrig.process import process_run
 from labrig.protocols.led_fluorescence.analysis import analyse
 from labrig.protocols.led_fluorescence.result import LedFluorescenceResult
-from tests.acceptance.mixture_colours import FOLDER, LEAST_FRACTION
+from tests.acceptance.mixture_colours import FOLDER, MIN_FRACTION
 from tests.analyse.recorded import part_of, quietly
 
 LIGHTS = ("D65", "A")
@@ -72,7 +72,7 @@ def measure(asked: argparse.Namespace, folder: Path) -> None:
     files = [
         path
         for path in matrix_files(FOLDER)
-        if read_reradiation(path).reradiated_fraction.max() > LEAST_FRACTION
+        if read_reradiation(path).reradiated_fraction.max() > MIN_FRACTION
     ]
     count = len(files) if asked.patches is None else asked.patches
     true = {_name(files, number): files[number % len(files)] for number in range(count)}

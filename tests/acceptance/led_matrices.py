@@ -51,7 +51,7 @@ CAMERA = "canon_eos_5d_mark_ii"
 OTHER_CURVES = SHARED / "camera_sensitivity/ssf_data/jiang2013_Canon_5DMarkII.csv"
 LIGHTS = ("D65", "A")
 #: Fraction of the light of some wavelength from which a surface counts as re-radiating here.
-LEAST_FRACTION = 0.1
+MIN_FRACTION = 0.1
 NINE = (
     "LedEngin_LZ1_10UB00_00U8_405nm",
     "Epileds_3W_430nm",
@@ -177,7 +177,7 @@ def reradiating() -> list[ReradiationMatrix]:
     found = []
     for path in matrix_files(SHARED / "bispectral/rit_bfc450"):
         measured = read_reradiation(path)
-        if measured.reradiated_fraction.max() > LEAST_FRACTION:
+        if measured.reradiated_fraction.max() > MIN_FRACTION:
             found.append(on_stokes_side(corrected(measured)))
     return found
 
@@ -187,7 +187,7 @@ def not_reradiating() -> list[ReradiationMatrix]:
     found = []
     for path in matrix_files(SHARED / "bispectral/rit_bfc450"):
         measured = read_reradiation(path)
-        if measured.reradiated_fraction.max() <= LEAST_FRACTION:
+        if measured.reradiated_fraction.max() <= MIN_FRACTION:
             zero = np.zeros_like(measured.reradiation)
             found.append(replace(measured, reradiation=zero, reradiation_sigma=None))
     return found

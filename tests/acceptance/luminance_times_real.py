@@ -31,7 +31,7 @@ from tests.acceptance.luminance_times import (
 from tests.real_data import REAL, SHARED
 
 #: Fall from the first reading to the level, and counts that are left at least.
-FALLS, LEAST_COUNTS = (10.0, 30.0, 100.0), 50.0
+FALLS, MIN_COUNTS = (10.0, 30.0, 100.0), 50.0
 N_READINGS, FEWEST, PHASES = 80, 16, 4
 #: Bins of the whole decay, of which the true time is taken.
 N_BINS = 150
@@ -81,7 +81,7 @@ def records(decay: Decay, part: float) -> Iterator[Record]:
     begin = float(np.median(light[:5]))
     for fall in FALLS:
         level = begin / fall
-        if level < LEAST_COUNTS:
+        if level < MIN_COUNTS:
             continue
         end_s = _true_s(decay, level)
         if end_s is None:

@@ -28,7 +28,7 @@ from tests.real_data import SHARED
 FOLDER = SHARED / "bispectral/rit_bfc450"
 LIGHTS = ("D65", "A", "450nm", "395nm")
 #: Fraction of the light of some wavelength from which a surface counts as re-radiating here.
-LEAST_FRACTION = 0.1
+MIN_FRACTION = 0.1
 
 
 def main() -> None:
@@ -44,7 +44,7 @@ def main() -> None:
     rows, glowing = [], []
     for path in matrix_files(asked.folder):
         measured = read_reradiation(path)
-        if measured.reradiated_fraction.max() <= LEAST_FRACTION:
+        if measured.reradiated_fraction.max() <= MIN_FRACTION:
             continue
         whole = corrected(measured)
         reference = measured if asked.uncorrected else whole

@@ -24,7 +24,7 @@ from labrig.material import (
     reradiates,
 )
 from labrig.optics import read_light
-from tests.acceptance.mixture_colours import LEAST_FRACTION, LIGHTS
+from tests.acceptance.mixture_colours import LIGHTS, MIN_FRACTION
 from tests.acceptance.mixture_peer_methods import Target
 from tests.real_data import SHARED
 
@@ -89,7 +89,7 @@ def fluorescent(folder: Path) -> Iterator[ReradiationMatrix]:
     notes = [folder / f"art_postit/fluorescent_{colour}.csv" for colour in POSTITS]
     for path in [*files, *notes]:
         measured = read_reradiation(path)
-        if measured.reradiated_fraction.max() <= LEAST_FRACTION:
+        if measured.reradiated_fraction.max() <= MIN_FRACTION:
             continue
         whole = corrected(measured)
         if reradiates(whole):

@@ -25,7 +25,7 @@ MISSING = (
 #: Iterations of pomegranate between two looks at the likelihood, which it does not weigh itself.
 BLOCK = 5
 #: A factorisation ends at this gain, in parts of the squared error, or after so many sweeps.
-LEAST_GAIN, MOST_SWEEPS = 1e-6, 2000
+MIN_GAIN, MAX_SWEEPS = 1e-6, 2000
 #: Ridge, in parts of the largest squared factor, where a row has fewer entries than factors.
 RIDGE = 1e-9
 
@@ -211,11 +211,11 @@ def stokes_svd(target: Target, rank: int) -> Floats:
     rows, size, columns = np.linalg.svd(wanted, full_matrices=False)
     left, right = rows[:, :rank] * np.sqrt(size[:rank]), (columns[:rank].T) * np.sqrt(size[:rank])
     before = np.inf
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         left = _rows_by_least_squares(wanted, used, right)
         right = _rows_by_least_squares(wanted.T, used.T, left)
         error = float(np.square((left @ right.T - wanted)[used]).sum())
-        if before - error < LEAST_GAIN * error:
+        if before - error < MIN_GAIN * error:
             break
         before = error
     return _unboxed(target, left @ right.T)
@@ -243,11 +243,11 @@ def knots(target: Target, components: int) -> Floats:
     _, _, columns = np.linalg.svd(wanted, full_matrices=False)
     excitation = np.abs(columns[0])
     before = np.inf
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         emission = _on_knots(on_rows, wanted, used, excitation)
         excitation = _on_knots(on_columns, wanted.T, used.T, emission)
         error = float((used * np.square(np.outer(emission, excitation) - wanted)).sum())
-        if before - error < LEAST_GAIN * error:
+        if before - error < MIN_GAIN * error:
             break
         before = error
     return _unboxed(target, np.outer(emission, excitation))
@@ -267,13 +267,13 @@ def _nmf(target: Target, rank: int, used: Floats) -> Floats:
     wanted = target.values[target.box]
     left, right = _non_negative_start(wanted, rank)
     before = np.inf
-    for _ in range(MOST_SWEEPS):
+    for _ in range(MAX_SWEEPS):
         for k in range(rank):
             rest = wanted - left @ right.T + np.outer(left[:, k], right[:, k])
             left[:, k] = _non_negative_factor(rest, used, right[:, k])
             right[:, k] = _non_negative_factor(rest.T, used.T, left[:, k])
         error = float((used * np.square(left @ right.T - wanted)).sum())
-        if before - error < LEAST_GAIN * error:
+        if before - error < MIN_GAIN * error:
             break
         before = error
     return _unboxed(target, left @ right.T)

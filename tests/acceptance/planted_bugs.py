@@ -23,7 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 BUGS = Path(__file__).with_suffix(".toml")
 NOTICED_SHARE = 0.9
-LONGEST_S = 600.0
+MAX_S = 600.0
 #: Exit codes of pytest.
 PASSED, FAILED = 0, 1
 
@@ -117,7 +117,7 @@ def _tried(bug: PlantedBug, copy: Path) -> tuple[Verdict, str]:
             env=os.environ | {"PYTHONPATH": f"{copy / '.editable'}{os.pathsep}{copy}"},
             capture_output=True,
             encoding="utf-8",
-            timeout=LONGEST_S,
+            timeout=MAX_S,
         )
     except (ValueError, FileNotFoundError, subprocess.TimeoutExpired) as error:
         return Verdict.NOT_RUN, str(error)

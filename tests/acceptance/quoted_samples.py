@@ -8,7 +8,7 @@ from tests.acceptance.printed import Extract, columns, furthest, match, span
 from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
 
 #: Middles of the LEDs' bands in nm that the page takes together, and those that it names.
-MOST_NM, NAMED_NM = (455, 495, 530, 565, 605), (640, 680, 415)
+MAX_NM, NAMED_NM = (455, 495, 530, 565, 605), (640, 680, 415)
 #: Words of the page's table by the name of each way of selecting lights, and its rooms.
 WAYS = {
     "filters": ("8 filters in 8 bands of 37.5 nm", ("smooth", "steps")),
@@ -31,8 +31,8 @@ def _leds_by_camera(printed: str) -> str:
         for pattern in (r"(\d+) % within 1 σ", r"(\d+) % within 2 σ", r"([\d.]+) σ at most")
     )
     return (
-        f"those from {MOST_NM[0]} to {MOST_NM[-1]} nm were off by "
-        f"{span(off[nm] for nm in MOST_NM)} % (rms), at 640 and 680 nm by {first} and {second} %, "
+        f"those from {MAX_NM[0]} to {MAX_NM[-1]} nm were off by "
+        f"{span(off[nm] for nm in MAX_NM)} % (rms), at 640 and 680 nm by {first} and {second} %, "
         f"and at 415 nm by {ultraviolet} %; {one} % within σ and {two} % within 2 σ, none beyond "
         f"{largest} σ"
     )

@@ -47,7 +47,7 @@ PATHS = 24 * CHUNK
 #: Times of a ray in µs: by compiled code in a small scene, and in a large one.
 RAYS_US = (0.3, 10.0)
 #: Least probability with which a path goes on.
-LEAST_SURVIVAL = 0.05
+MIN_SURVIVAL = 0.05
 #: Probability with which a fold goes on: near the largest of the surfaces' albedos.
 SURVIVAL = 0.8
 MEASURED = SHARED / "bispectral/rit_bfc450/PAPYEL.BFC"
@@ -139,7 +139,7 @@ def single_wavelengths(room: Enclosure, number: int) -> Draw:
                 drawn = paper.shift.draw(given, "eye", rng.random((3, given.size)))
                 going_nm[:, here] = drawn.wavelength_nm.reshape(number, -1)
                 going[:, here] = throughput[:, here] * drawn.weight.reshape(number, -1)
-            survival = np.clip(going.mean(axis=0), LEAST_SURVIVAL, 1.0)
+            survival = np.clip(going.mean(axis=0), MIN_SURVIVAL, 1.0)
             goes_on = (rng.random(alive.size) < survival) & (going > 0).any(axis=0)
             alive, nm = alive[goes_on], going_nm[:, goes_on]
             throughput = going[:, goes_on] / survival[goes_on]

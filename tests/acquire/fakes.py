@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from labrig.acquire import CameraOffers, ExposureSettings, Frame, ManualStep
+from labrig.acquire import CameraCapabilities, ExposureSettings, Frame, ManualStep
 from labrig.foundation.clock import VirtualClock
 from labrig.record import FrameRecord
 
@@ -99,8 +99,10 @@ class NotingCamera:
     def identity(self) -> str:
         return "noting camera"
 
-    def offers(self) -> CameraOffers:
-        return CameraOffers((0.5, 1.0, 2.0), (100, 400), (4.0,), overhead_s=1.0, frame_bytes=10)
+    def capabilities(self) -> CameraCapabilities:
+        return CameraCapabilities(
+            (0.5, 1.0, 2.0), (100, 400), (4.0,), overhead_s=1.0, frame_bytes=10
+        )
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         self._note(f"configure {settings}")

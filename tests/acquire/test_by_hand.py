@@ -14,7 +14,7 @@ from labrig.acquire import (
     ManualStep,
     Rig,
     Session,
-    Shoot,
+    TakeFrame,
     run_units,
 )
 from labrig.foundation.clock import Interrupted, VirtualClock
@@ -38,7 +38,7 @@ class Filter:
         step = ManualStep(f"put filter {self.number} in", "it is next", f"filter {self.number}")
         session.ask(step)
         session.perform(LAMP_ON)
-        session.perform(Shoot(self.name, ExposureSettings(1.0, 100, 4.0)))
+        session.perform(TakeFrame(self.name, ExposureSettings(1.0, 100, 4.0)))
 
 
 class Changer:

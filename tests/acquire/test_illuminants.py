@@ -22,7 +22,7 @@ from labrig.acquire import (
     run_units,
 )
 from labrig.bench import open_bench
-from labrig.bench_optics import illuminant_exposures
+from labrig.bench_optics import illuminant_sources
 from labrig.foundation.errors import ProtocolError, UsageError
 from labrig.optics import read_light
 from labrig.record import RunFolder
@@ -140,7 +140,7 @@ def test_bad_keys_of_a_bank_are_one_clear_line(rig: Path, lamps: object, said: s
 def test_the_light_is_that_of_file_illuminant_or_band_behind_its_filter(rig: Path) -> None:
     file = read_rig_file(rig)
     assert set(bank_lights(file, ILLUMINANTS.key, str(rig))) == set(LAMPS)
-    lights = illuminant_exposures(file, str(rig))
+    lights = illuminant_sources(file, str(rig))
     nm = [450.0, 600.0]
     np.testing.assert_allclose(lights["day"].light.at(nm), read_light("D65").at(nm))
     bare = Illuminant(spectrum="halogen_3000k").relative_spectrum()
@@ -158,7 +158,7 @@ def test_nothing_known_of_a_lamp_and_no_bank_are_one_clear_line(rig: Path, make_
     content["devices"]["illuminants"]["channels"] = {"dim": {"relay": 1}}
     rig.write_text(write_quickly(content), encoding="utf-8")
     with pytest.raises(UsageError, match="nothing is known of the light of lamp 'dim'"):
-        illuminant_exposures(read_rig_file(rig), str(rig))
+        illuminant_sources(read_rig_file(rig), str(rig))
     without = make_rig()
     with pytest.raises(UsageError, match="expected 'illuminants' under 'devices'"):
-        illuminant_exposures(read_rig_file(without), str(without))
+        illuminant_sources(read_rig_file(without), str(without))

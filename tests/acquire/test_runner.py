@@ -13,7 +13,7 @@ from labrig.acquire import (
     ExposureSettings,
     Rig,
     Session,
-    Shoot,
+    TakeFrame,
     at,
     run_units,
 )
@@ -39,8 +39,8 @@ class Flash:
         session.run_sequence(
             [
                 at(0.0, LAMP_OFF),
-                at(0.5, Shoot("decay", SETTINGS)),
-                at(5.5, Shoot("decay", SETTINGS)),
+                at(0.5, TakeFrame("decay", SETTINGS)),
+                at(5.5, TakeFrame("decay", SETTINGS)),
             ]
         )
         self.seen = session.frames("decay")
@@ -97,7 +97,7 @@ def test_a_frame_that_cannot_begin_in_time_is_taken_and_recorded_as_late(
 
     class Hasty(Flash):
         def run(self, session: Session) -> None:
-            session.run_sequence([at(t, Shoot("decay", SETTINGS)) for t in (0.0, 1.0)])
+            session.run_sequence([at(t, TakeFrame("decay", SETTINGS)) for t in (0.0, 1.0)])
 
     with folder:
         run_units([Hasty("a")], rig, folder, Watching(), {})

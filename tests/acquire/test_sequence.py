@@ -14,8 +14,8 @@ from labrig.acquire import (
     LateAction,
     Rig,
     Session,
-    Shoot,
     Swing,
+    TakeFrame,
     at,
     run_units,
 )
@@ -26,7 +26,7 @@ from labrig.record import Attempt, RunFolder
 
 from .fakes import NotingCamera, NotingDoor, NotingLamp, NotingShield, Watching
 
-FRAME = Shoot("decay", ExposureSettings(2.0, 400, 4.0))
+FRAME = TakeFrame("decay", ExposureSettings(2.0, 400, 4.0))
 
 
 class Bench:
@@ -152,7 +152,7 @@ class TwoFrames:
     def run(self, session: Session) -> None:
         session.perform(FRAME)
         with pytest.raises(DeviceError, match="refused"):
-            session.perform(Shoot("decay", ExposureSettings(1.0, 100, 4.0)))
+            session.perform(TakeFrame("decay", ExposureSettings(1.0, 100, 4.0)))
         session.perform(FRAME)
 
 

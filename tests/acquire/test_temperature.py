@@ -15,7 +15,7 @@ from labrig.acquire import (
     PartUnit,
     Rig,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     at,
     run_units,
@@ -67,7 +67,7 @@ class ChargeAndDecay:
         session.perform(LAMP_ON)
         session.wait(600.0, "charging")
         session.run_sequence(
-            [at(0.0, LAMP_OFF), *(at(time_s, Shoot("decay", SETTINGS)) for time_s in FRAMES_S)]
+            [at(0.0, LAMP_OFF), *(at(time_s, TakeFrame("decay", SETTINGS)) for time_s in FRAMES_S)]
         )
 
 

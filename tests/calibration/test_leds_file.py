@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import RigFile, read_rig_file
-from labrig.bench_optics import led_exposures
+from labrig.bench_optics import led_sources
 from labrig.calibration import LEDS_KIND, LedsFile
 from labrig.fit.fluorescence import Exposure
 from labrig.foundation import resources
@@ -80,8 +80,8 @@ def test_a_malformed_file_is_one_line(tmp_path: Path, changed: dict[str, Any], s
 def test_lights_for_a_fit_are_as_calibrated_else_by_the_rig_file() -> None:
     leds = {"455 nm": led(), "365 nm": led(**UNKNOWN)}
     file = LedsFile.model_validate(content(leds=leds, uv_scale="unknown"))
-    exposures = led_exposures(bench(), "the rig", file)
-    assert list(exposures) == list(led_exposures(bench(), "the rig"))
+    exposures = led_sources(bench(), "the rig", file)
+    assert list(exposures) == list(led_sources(bench(), "the rig"))
     blue, ultraviolet, green = (exposures[name] for name in ("455 nm", "365 nm", "530 nm"))
     assert (blue.brightness, blue.brightness_sigma, blue.wavelength_sigma_nm) == (0.8, 0.02, 0.2)
     assert blue.light.at([450.0, 455.0]) == pytest.approx([1.0, 0.55])
@@ -96,10 +96,10 @@ def test_lights_for_a_fit_are_as_calibrated_else_by_the_rig_file() -> None:
 def test_a_calibration_of_other_leds_is_one_line() -> None:
     file = LedsFile.model_validate(content(leds={"940 nm": led()}))
     with pytest.raises(UsageError, match=r"has '940 nm', the rig has 365 nm, .*run led_brightness"):
-        led_exposures(bench(), "the rig", file)
+        led_sources(bench(), "the rig", file)
     lamp_only = read_rig_file(resources.find("config", "rig", "sim"))
     with pytest.raises(UsageError, match="expected LEDs under 'devices'"):
-        led_exposures(lamp_only, "the rig")
+        led_sources(lamp_only, "the rig")
 
 
 def test_nothing_known_of_a_light_is_one_line() -> None:
@@ -108,4 +108,4 @@ def test_nothing_known_of_a_light_is_one_line() -> None:
     devices["leds"]["channels"] = {"blue": {"output": 1}}
     bare = RigFile.model_validate({"name": "bare", "devices": {"leds": devices["leds"]}})
     with pytest.raises(UsageError, match="light of LED 'blue'; give its 'centre' and 'fwhm'"):
-        led_exposures(bare, "the rig")
+        led_sources(bare, "the rig")

@@ -15,7 +15,7 @@ from labrig.acquire import (
     ManualStep,
     ProtocolModel,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     plan,
     read_rig_file,
@@ -96,12 +96,12 @@ class Piece:
 
     def run(self, session: Session) -> None:
         session.ask(ManualStep("put a fresh sample in", "it must not glow", "fresh sample", 40.0))
-        session.perform(Shoot("before", self.frame))
+        session.perform(TakeFrame("before", self.frame))
         session.perform(LAMP_ON)
         session.wait(60.0, "charging")
         session.perform(LAMP_OFF)
         session.wait(1.0, "lamp fades")
-        session.perform(Shoot("after", self.frame))
+        session.perform(TakeFrame("after", self.frame))
 
 
 class Pieces(ProtocolModel):

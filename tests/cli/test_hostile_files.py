@@ -92,7 +92,7 @@ def test_the_watch_sees_each_deed(
     stage: Stage, listener: Listener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else the tests above could not fail."""
-    monkeypatch.setattr("tests.hostile_files.MOST_BYTES", 1 << 20)
+    monkeypatch.setattr("tests.hostile_files.MAX_BYTES", 1 << 20)
 
     def write() -> None:
         (stage.outside / "new").write_text("x")

@@ -65,16 +65,16 @@ def as_camera(bus: VirtualBus) -> dict[str, Any]:
     settings = PtpCamera.Settings.model_validate({"isos": [100], "transfer_timeout": "5 s"})
     camera = PtpCamera(ADDRESS, settings, OnTheBus(bus))
     assert isinstance(camera, Camera)
-    offers = camera.offers()
+    capabilities = camera.capabilities()
     findings = [(each.severity, str(each)) for each in camera.findings()]
-    in_force = camera.configure(ExposureSettings(0.02, 100, offers.f_numbers[0]))
+    in_force = camera.configure(ExposureSettings(0.02, 100, capabilities.f_numbers[0]))
     refused = [refusal(camera) for _ in range(2)]
     camera.make_safe()
     camera.disconnect()
     return {
         "identity": camera.identity(),
-        "exposures_s": offers.exposures_s,
-        "f_numbers": offers.f_numbers,
+        "exposures_s": capabilities.exposures_s,
+        "f_numbers": capabilities.f_numbers,
         "findings": findings,
         "in_force": str(in_force),
         "refused": refused,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.fit import LitSpectrum, bispectral_columns, separate_columns
+from labrig.fit import IlluminatedSpectrum, bispectral_columns, separate_columns
 from labrig.fit.bispectral import band_weights_nm
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -38,8 +38,8 @@ def columns_of(
     """Errors over σ of the columns of one measurement with errors of that σ."""
     band = np.clip(np.searchsorted(EDGES_NM, NM) - 1, 0, len(OUTPUT_NM) - 1)
     factor = (1 + scale * rng.normal(size=len(OUTPUT_NM)))[band]
-    lights: list[LitSpectrum] = []
-    samples: list[LitSpectrum] = []
+    lights: list[IlluminatedSpectrum] = []
+    samples: list[IlluminatedSpectrum] = []
     truth: list[FloatArray] = []
     for part, shape in zip((0.4, 0.3, 0.1), LIGHTS, strict=True):
         light = skewed(*shape)
@@ -48,7 +48,7 @@ def columns_of(
         changed = (1 + change * rng.normal()) * back
         for kept, clean in ((lights, light), (samples, changed)):
             value = factor * clean + rng.normal(0, noise or 1e-9, len(NM))
-            kept.append(LitSpectrum(NM, value, np.full(len(NM), noise or 1e-9)))
+            kept.append(IlluminatedSpectrum(NM, value, np.full(len(NM), noise or 1e-9)))
     columns = bispectral_columns(
         lights, samples, OUTPUT_NM, np.full(len(OUTPUT_NM), scale), np.full(3, change)
     )
@@ -73,8 +73,8 @@ def test_sigma_is_that_of_the_errors(errors: dict[str, float], seed: int) -> Non
 
 def test_the_order_of_the_lights_is_that_of_their_wavelengths() -> None:
     noise = np.full(len(NM), 1e-6)
-    spectra = [LitSpectrum(NM, skewed(*shape), noise) for shape in LIGHTS]
-    backs = [LitSpectrum(NM, surface(skewed(*shape), 0.3), noise) for shape in LIGHTS]
+    spectra = [IlluminatedSpectrum(NM, skewed(*shape), noise) for shape in LIGHTS]
+    backs = [IlluminatedSpectrum(NM, surface(skewed(*shape), 0.3), noise) for shape in LIGHTS]
     rising = bispectral_columns(spectra, backs, OUTPUT_NM)
     falling = bispectral_columns(spectra[::-1], backs[::-1], OUTPUT_NM)
     assert falling.order.tolist() == [2, 1, 0]
@@ -89,7 +89,7 @@ def test_the_order_of_the_lights_is_that_of_their_wavelengths() -> None:
 
 
 def test_what_is_no_light_is_refused_in_one_line() -> None:
-    dark = LitSpectrum(NM, np.zeros(len(NM)), np.ones(len(NM)))
+    dark = IlluminatedSpectrum(NM, np.zeros(len(NM)), np.ones(len(NM)))
     with pytest.raises(DataError, match="expected light on the white reference, got none"):
         bispectral_columns([dark], [dark], OUTPUT_NM)
     with pytest.raises(DataError, match="expected a spectrum of the sample for every light"):

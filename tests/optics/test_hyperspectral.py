@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.fit.bispectral import LitSpectrum, bispectral_columns, separate_columns
+from labrig.fit.bispectral import IlluminatedSpectrum, bispectral_columns, separate_columns
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import HyperspectralCube, Spectrum, read_hyperspectral_cube
 
@@ -114,8 +114,8 @@ def test_columns_of_a_region_are_right_within_sigma(seed: int) -> None:
     )
     emission /= np.trapezoid(emission, NM)
     output_nm = np.arange(400.0, 761.0, 10.0)
-    lights: list[LitSpectrum] = []
-    samples: list[LitSpectrum] = []
+    lights: list[IlluminatedSpectrum] = []
+    samples: list[IlluminatedSpectrum] = []
     truth = []
     for centre_nm, part in ((430.0, 0.3), (470.0, 0.2)):
         off_nm = NM - centre_nm
@@ -124,7 +124,7 @@ def test_columns_of_a_region_are_right_within_sigma(seed: int) -> None:
         for kept, spectrum in ((lights, light), (samples, back)):
             clean = np.broadcast_to(spectrum, (20, 20, len(NM)))
             cube = HyperspectralCube("cloth", NM, clean + rng.normal(0, 0.01, clean.shape))
-            kept.append(LitSpectrum.of(cube.spectrum((0, 0, 20, 20))))
+            kept.append(IlluminatedSpectrum.of(cube.spectrum((0, 0, 20, 20))))
         power = np.trapezoid(light, NM)
         truth.append(
             Spectrum("back", NM, back / power).in_bands(np.arange(395.0, 766.0, 10.0)) * 10

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.acquire import CameraOffers
+from labrig.acquire import CameraCapabilities
 from labrig.protocols.steps.exposure_metering import TARGET, DecayMeter, MeteringFrame
 from tests.protocols.metering import RANGE_DN, measure_frame
 
 #: Shutter times so close that none is far from what is wanted.
-OFFERS = CameraOffers(
+OFFERS = CameraCapabilities(
     tuple(np.geomspace(1e-3, 30.0, 2000).tolist()), (400,), (4.0,), overhead_s=1.0, frame_bytes=10
 )
 RATE_DN_PER_S, K_PER_S = 1500.0, 0.02

@@ -48,5 +48,5 @@ def test_too_many_sequences_are_folded_band_by_band(monkeypatch: pytest.MonkeyPa
     to_rgb = spectral_bands(scene.bands.edges_nm).to_rgb
     dark = np.zeros((len(scene.geometry(0.0).material_of_place), len(scene.bands)), np.float32)
     few = Renderer(scene, 1).colours(dark, [1.0], to_rgb)
-    monkeypatch.setattr("labrig.reproduce.transport.folding.MOST_SEQUENCES", 3)
+    monkeypatch.setattr("labrig.reproduce.transport.folding.MAX_SEQUENCES", 3)
     np.testing.assert_allclose(Renderer(scene, 1).colours(dark, [1.0], to_rgb), few, rtol=1e-4)

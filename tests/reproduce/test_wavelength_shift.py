@@ -95,7 +95,7 @@ def test_densities_integrate_to_one_and_are_none_beyond_the_stokes_side(start: S
 
 
 #: Some powers of ten above the least normal number.
-LEAST_NORMAL = 1e-290
+MIN_NORMAL = 1e-290
 
 
 @given(seed=st.integers(0, 10_000), given_nm=st.floats(330, 750))
@@ -111,7 +111,7 @@ def test_densities_are_the_conditional_ones_within_the_range(seed: int, given_nm
         reached = conditional.cdf([300.0, 780.0], given_nm)
         inside = float(reached[1] - reached[0])
         # A sum of numbers below the normal ones has lost its digits.
-        if inside < 1e-9 or conditional.integral(given_nm) < LEAST_NORMAL:
+        if inside < 1e-9 or conditional.integral(given_nm) < MIN_NORMAL:
             continue
         expected = conditional.pdf(others, given_nm) / inside
         assert surface.density(given_nm, others, start) == pytest.approx(

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from labrig.acquire import CameraOffers, ExerciseContext, Exercised, ExposureSettings, Frame
+from labrig.acquire import CameraCapabilities, ExerciseContext, Exercised, ExposureSettings, Frame
 from labrig.acquire.roles.camera import exercise_camera
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import FrameError
@@ -40,8 +40,8 @@ class StillCamera:
     def identity(self) -> str:
         return "still camera"
 
-    def offers(self) -> CameraOffers:
-        return CameraOffers((1 / 64, 0.5, 2.0), (100, 400, 1600))
+    def capabilities(self) -> CameraCapabilities:
+        return CameraCapabilities((1 / 64, 0.5, 2.0), (100, 400, 1600))
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         self._settings = settings

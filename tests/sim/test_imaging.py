@@ -13,7 +13,7 @@ from labrig.sim.lamp import C2_NM_K, WAVELENGTH_NM, Lamp
 from labrig.sim.layout import PIECES, Lvf
 from labrig.sim.sensor import BLACK_DN, Sensor, gain_electrons_per_dn
 from labrig.sim.simulation import LampSettings
-from labrig.sim.wander import ZERO_S, Ripple, Wander
+from labrig.sim.wander import ZERO_S, OrnsteinUhlenbeckNoise, Ripple
 from tests.sim.darkroom import SMALL, Darkroom, colours
 
 #: A glowing sample in the left half of the frame; the right half is cloth.
@@ -72,7 +72,9 @@ def test_texture_is_seen_in_photographs() -> None:
 
 def test_what_wanders_is_normal_and_forgets_exponentially() -> None:
     times_s = ZERO_S + np.array([0.0, 10.0, 30.0, 300.0])
-    courses = [Wander(np.random.default_rng([7, seed]), 30.0) for seed in range(1500)]
+    courses = [
+        OrnsteinUhlenbeckNoise(np.random.default_rng([7, seed]), 30.0) for seed in range(1500)
+    ]
     values = np.array([[course(t) for t in times_s] for course in courses])
     assert values.std(axis=0) == pytest.approx(np.ones(4), abs=0.08)
     correlation = np.corrcoef(values.T)[0]
@@ -87,7 +89,7 @@ def exposed(sensor: Sensor, at_s: float, electrons: float = 5000.0) -> float:
 
 @pytest.fixture
 def course() -> Callable[[float], float]:
-    return Wander(np.random.default_rng(3), 60.0)
+    return OrnsteinUhlenbeckNoise(np.random.default_rng(3), 60.0)
 
 
 def test_correlated_flicker_and_black_level_follow_their_course(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
+from labrig.acquire import CameraCapabilities, ExposureSettings, Finding, Frame
 from labrig.foundation.clock import Clock
 
 from ..device_info import DeviceInfo
@@ -110,7 +110,7 @@ class EosCamera:
             with suppress(RefusedError):
                 self._session.transact(step, 0, timeouts=SHORT_TIMEOUTS)
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the exposure settings that the camera offers now.
 
         Raises
@@ -120,7 +120,7 @@ class EosCamera:
             not at M.
         """
         self._state.refresh()
-        return self._exposure.offers()
+        return self._exposure.capabilities()
 
     def findings(self) -> Sequence[Finding]:
         """Return findings on dial, lens switch and menus.

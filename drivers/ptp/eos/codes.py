@@ -17,11 +17,11 @@ _STEP = {0: Fraction(0), 3: Fraction(1, 3), 4: Fraction(1, 2), 5: Fraction(2, 3)
 #: Code of a shutter time of 1 s.
 _TV_ZERO = 0x38
 #: 32 s ("30") and 1/8192 s ("1/8000").
-LONGEST_TV, SHORTEST_TV = 0x10, 0xA0
+MAX_TV, MIN_TV = 0x10, 0xA0
 #: Code of bulb: the shutter stays open until the command to close.
 BULB_TV = 0x0C
 #: Longer times than the dial's begin here, and double.
-SHORTEST_BULB_S = 64.0
+MIN_BULB_S = 64.0
 #: A dial label is at most 0.09 stop off the true time; neighbours are at least 1/6 stop apart.
 SAME_SHUTTER_STOPS = 0.1
 #: Neighbouring aperture labels differ by 6 % or more.
@@ -62,21 +62,21 @@ ISOS = MappingProxyType(
 def shutter_time_s(code: int) -> float | None:
     """Return the actual shutter time of a Tv code, in seconds; None for bulb and unknown codes."""
     stops, eighths = divmod(code - _TV_ZERO, 8)
-    if not LONGEST_TV <= code <= SHORTEST_TV or eighths not in _STEP:
+    if not MAX_TV <= code <= MIN_TV or eighths not in _STEP:
         return None
     return float(2.0 ** -float(stops + _STEP[eighths]))
 
 
 def third_stop_codes() -> tuple[int, ...]:
     """Return the Tv codes in thirds of a stop, from the longest time to the shortest."""
-    codes = range(LONGEST_TV, SHORTEST_TV + 1)
+    codes = range(MAX_TV, MIN_TV + 1)
     return tuple(c for c in codes if (c - _TV_ZERO) % 8 in (0, 3, 5))
 
 
 def bulb_times_s(longest_s: float) -> tuple[float, ...]:
     """Return the times offered at bulb, doubling from 64 s up to `longest_s` seconds."""
     times_s = []
-    time_s = SHORTEST_BULB_S
+    time_s = MIN_BULB_S
     while time_s <= longest_s:
         times_s.append(time_s)
         time_s *= 2
@@ -100,7 +100,7 @@ def labelled_times_s(label_s: float) -> tuple[float, ...]:
     Labels of halves are as much as a quarter of a stop off: 10 is 11.3 s, 0.3 is 0.35 s. A label
     beyond the dial is of an exposure at bulb, which has no actual time of its own.
     """
-    longest_s = shutter_time_s(LONGEST_TV)
+    longest_s = shutter_time_s(MAX_TV)
     assert longest_s is not None
     if label_s > longest_s * 2 ** (1 / 6):
         return ()

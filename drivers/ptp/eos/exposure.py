@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection
 
-from labrig.acquire import CameraOffers, ExposureSettings, frame_bytes
+from labrig.acquire import CameraCapabilities, ExposureSettings, frame_bytes
 from labrig.foundation.errors import DeviceError
 
 from ..settings import PtpCameraSettings
@@ -11,8 +11,8 @@ from .codes import (
     BULB_TV,
     F_NUMBERS,
     ISOS,
+    MIN_BULB_S,
     SAME_SHUTTER_STOPS,
-    SHORTEST_BULB_S,
     aperture_code,
     iso_code,
     shutter_code,
@@ -56,7 +56,7 @@ class EosExposure:
         """Whether the PC ends the next exposure."""
         return self._shutter() == BULB_TV
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the camera's own lists, less what the rig file excludes, plus bulb if it needs it.
 
         Raises
@@ -76,7 +76,7 @@ class EosExposure:
                 f"the camera offers none of the rig file's {missing}: turn its dial to M, "
                 "or correct the rig file"
             )
-        return CameraOffers(
+        return CameraCapabilities(
             exposures_s=exposures_s,
             isos=tuple(isos),
             f_numbers=tuple(sorted(f_numbers)),
@@ -134,7 +134,7 @@ class EosExposure:
         iso = iso_code(requested.iso, self._iso_codes())
         if shutter is None or iso is None:
             missing = "shutter time" if shutter is None else "ISO"
-            dial = "B" if shutter is None and requested.exposure_s >= SHORTEST_BULB_S else "M"
+            dial = "B" if shutter is None and requested.exposure_s >= MIN_BULB_S else "M"
             raise DeviceError(
                 f"asked the camera for {requested}, it does not offer this {missing}: choose from "
                 f"what 'labrig rig check' shows, or turn its dial to {dial}"

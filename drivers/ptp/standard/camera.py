@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Sequence
 from enum import IntEnum
 
-from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
+from labrig.acquire import CameraCapabilities, ExposureSettings, Finding, Frame
 from labrig.foundation.clock import Clock
 from labrig.foundation.errors import DeviceError
 
@@ -102,7 +102,7 @@ class StandardCamera:
     def give_back(self) -> None:
         """Do nothing: the camera's own buttons were never locked."""
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the exposure settings that the camera offers now.
 
         Raises
@@ -111,7 +111,7 @@ class StandardCamera:
             The camera offers no settings that the rig file allows, or does not report them.
         """
         self._require_manual()
-        return self._exposure.offers()
+        return self._exposure.capabilities()
 
     def findings(self) -> Sequence[Finding]:
         """Return findings on the camera's settings, as far as the standard reports them.

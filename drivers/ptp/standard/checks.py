@@ -14,7 +14,7 @@ from ..codes import Standard, StandardEvent, StandardProperty
 from ..device_info import DeviceInfo
 from ..failures import RefusedError
 from ..settings import PtpCameraSettings
-from .exposure import AUTO_ISO, FEWEST_UNITS, UNITS_PER_S
+from .exposure import AUTO_ISO, MIN_UNITS, UNITS_PER_S
 from .object_info import can_be_raw
 from .properties import PropertyDescription, StandardProperties
 
@@ -193,7 +193,7 @@ def _shutter(described: PropertyDescription | None) -> Iterator[Finding]:
     if described is None:
         yield Finding("refuse", "the camera does not tell its shutter time", "use another camera")
         return
-    listed = [units for units in described.settable_to(()) if units >= FEWEST_UNITS]
+    listed = [units for units in described.settable_to(()) if units >= MIN_UNITS]
     if not described.is_settable:
         yield Finding(
             "warn", "its shutter time cannot be set over PTP", "set it by hand, turn its dial to M"
@@ -207,7 +207,7 @@ def _shutter(described: PropertyDescription | None) -> Iterator[Finding]:
         )
     yield Finding(
         "fine",
-        f"shutter times below {FEWEST_UNITS / UNITS_PER_S * 1e3:g} ms stay unused (0.1 ms steps)",
+        f"shutter times below {MIN_UNITS / UNITS_PER_S * 1e3:g} ms stay unused (0.1 ms steps)",
     )
 
 

@@ -7,7 +7,7 @@ nominal time (1/60 s is 16.6 ms), whatever the actual one. The number is used as
 import math
 from collections.abc import Iterable, Sequence
 
-from labrig.acquire import CameraOffers, ExposureSettings, frame_bytes
+from labrig.acquire import CameraCapabilities, ExposureSettings, frame_bytes
 from labrig.foundation.errors import DeviceError
 
 from ..codes import StandardProperty
@@ -17,7 +17,7 @@ from .properties import PropertyDescription, StandardProperties
 #: Units of ExposureTime per second.
 UNITS_PER_S = 10_000
 #: Fewest units, of which rounding is up to 2 %; shorter times are useless for photometry.
-FEWEST_UNITS = 25
+MIN_UNITS = 25
 #: Units of FNumber: hundredths.
 F_NUMBER_UNITS = 100
 #: Values of ExposureIndex; 0 is "undefined".
@@ -52,7 +52,7 @@ class StandardExposure:
         self._settings = settings
         self._isos = isos
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the camera's own lists, less what the rig file excludes.
 
         Raises
@@ -68,7 +68,7 @@ class StandardExposure:
                 f"the camera offers none of the rig file's {missing}: set it to manual exposure, "
                 "or correct the rig file"
             )
-        return CameraOffers(
+        return CameraCapabilities(
             exposures_s=tuple(sorted(choice / UNITS_PER_S for choice in units)),
             isos=tuple(sorted(isos)),
             f_numbers=tuple(sorted(self._f_number_choices(self._aperture()))),
@@ -115,7 +115,7 @@ class StandardExposure:
         shutter, iso, aperture = self._shutter(), self._iso(), self._aperture()
         if not self._is_usable(shutter.value):
             raise DeviceError(
-                f"expected a shutter time from {FEWEST_UNITS / UNITS_PER_S * 1e3:g} ms to the rig "
+                f"expected a shutter time from {MIN_UNITS / UNITS_PER_S * 1e3:g} ms to the rig "
                 f"file's longest_exposure, the camera says {shutter.value} x 0.1 ms for its "
                 f"{StandardProperty.exposure_time}: set it to manual exposure, not to bulb"
             )
@@ -150,7 +150,7 @@ class StandardExposure:
         return [units for units in listed if self._is_usable(units)]
 
     def _is_usable(self, units: int) -> bool:
-        return units >= FEWEST_UNITS and self._settings.allows_exposure(units / UNITS_PER_S)
+        return units >= MIN_UNITS and self._settings.allows_exposure(units / UNITS_PER_S)
 
     def _iso_choices(self, iso: PropertyDescription | None) -> Sequence[int]:
         if iso is not None:

@@ -9,7 +9,7 @@ need in `__all__`.
 from typing import Any
 
 from labrig.acquire.roles.board_device import BoardDevice
-from labrig.acquire.roles.camera import CAMERA, Camera, Shoot
+from labrig.acquire.roles.camera import CAMERA, Camera, TakeFrame
 from labrig.acquire.roles.changer import CHANGER, Changer
 from labrig.acquire.roles.door_and_shield import (
     DOOR,
@@ -151,11 +151,11 @@ __all__ = [
     "ReadSpectrum",
     "Role",
     "SampleChanger",
-    "Shoot",
     "Spectrometer",
     "Suggestion",
     "Swing",
     "SwingTo",
+    "TakeFrame",
     "Thermometer",
     "Tune",
     "TurnCameraWheel",

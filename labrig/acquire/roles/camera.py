@@ -14,7 +14,7 @@ from labrig.acquire.roles.role import (
     Suggestion,
     spread_ms,
 )
-from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.acquire.values import CameraCapabilities, ExposureSettings, Frame
 from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import DeviceError
 from labrig.foundation.quantity import duration_text
@@ -40,7 +40,7 @@ class Camera(Device, Protocol):
     by it; without it, to 1 % with the label and with thirds and halves of a stop.
     """
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the settings that the camera offers in its present state."""
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
@@ -62,12 +62,12 @@ class Camera(Device, Protocol):
 class PlannedCamera(PlannedDevice):
     """Stand-in of a camera in a plan, which takes the time that the driver declares."""
 
-    def __init__(self, clock: VirtualClock, offers: CameraOffers) -> None:
+    def __init__(self, clock: VirtualClock, capabilities: CameraCapabilities) -> None:
         self._clock = clock
-        self._offers = offers
+        self._offers = capabilities
         self._settings: ExposureSettings | None = None
 
-    def offers(self) -> CameraOffers:
+    def capabilities(self) -> CameraCapabilities:
         """Return the settings that the driver declares."""
         return self._offers
 
@@ -90,7 +90,7 @@ class PlannedCamera(PlannedDevice):
 
 
 @dataclass(frozen=True)
-class Shoot:
+class TakeFrame:
     """One photograph, for which the session configures the camera beforehand and records the frame.
 
     Attributes
@@ -116,21 +116,21 @@ def exercise_camera(camera: Camera, context: ExerciseContext) -> Exercised:
     LabrigError
         If the camera failed, or its frame cannot be reduced.
     """
-    offers = camera.offers()
-    measured, suggestion = _timing(camera, offers, context)
-    frame, _ = _shoot(camera, _settings(offers, LONG_S), context)
+    capabilities = camera.capabilities()
+    measured, suggestion = _timing(camera, capabilities, context)
+    frame, _ = _shoot(camera, _settings(capabilities, LONG_S), context)
     reduced = context.frame_reader.dark_frame(frame)
     return Exercised(
-        (_measured_offers(offers), *measured, *reduced.measured),
+        (_measured_offers(capabilities), *measured, *reduced.measured),
         reduced.findings,
         (suggestion, *reduced.suggestions),
     )
 
 
 def _timing(
-    camera: Camera, offers: CameraOffers, context: ExerciseContext
+    camera: Camera, capabilities: CameraCapabilities, context: ExerciseContext
 ) -> tuple[list[Measured], Suggestion]:
-    settings = _settings(offers, SHORT_S)
+    settings = _settings(capabilities, SHORT_S)
     lags_s, cycles_s = [], []
     for _ in range(SHORT_FRAMES):
         frame, requested_s = _shoot(camera, settings, context)
@@ -160,22 +160,23 @@ def _shoot(
     return frame, requested_s
 
 
-def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
+def _settings(capabilities: CameraCapabilities, exposure_s: float) -> ExposureSettings:
     return ExposureSettings(
-        offers.exposure_at_most(exposure_s),
-        min(offers.isos, key=lambda iso: abs(iso - ISO)),
-        max(offers.f_numbers, default=None),
+        capabilities.exposure_at_most(exposure_s),
+        min(capabilities.isos, key=lambda iso: abs(iso - ISO)),
+        max(capabilities.f_numbers, default=None),
     )
 
 
-def _measured_offers(offers: CameraOffers) -> Measured:
+def _measured_offers(capabilities: CameraCapabilities) -> Measured:
     return Measured(
         "it offers",
-        f"{duration_text(offers.exposures_s[0])} to {duration_text(offers.exposures_s[-1])}, "
-        f"ISO {', '.join(map(str, offers.isos))}, "
+        f"{duration_text(capabilities.exposures_s[0])} to "
+        f"{duration_text(capabilities.exposures_s[-1])}, "
+        f"ISO {', '.join(map(str, capabilities.isos))}, "
         + (
-            f"f/{offers.f_numbers[0]:g} to f/{offers.f_numbers[-1]:g}"
-            if offers.f_numbers
+            f"f/{capabilities.f_numbers[0]:g} to f/{capabilities.f_numbers[-1]:g}"
+            if capabilities.f_numbers
             else "no aperture"
         ),
     )

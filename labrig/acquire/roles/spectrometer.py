@@ -20,11 +20,11 @@ from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
 
 #: Longest integration: one that runs cannot be interrupted, and dark current fills the pixels.
-LONGEST_S = 10.0
+MAX_S = 10.0
 #: Shortest and longest integration in a plan, which has not asked the instrument.
-PLANNED_LIMITS_S = (1e-3, LONGEST_S)
+PLANNED_LIMITS_S = (1e-3, MAX_S)
 #: Largest number of repetitions of one reading.
-MOST_REPETITIONS = 1000
+MAX_REPETITIONS = 1000
 #: Exercise: integration time and number of repetitions.
 EXERCISE_S, EXERCISE_REPETITIONS = 0.1, 10
 #: Part of the range above the dark pixels from which it is not dark.
@@ -123,7 +123,7 @@ class ReadSpectrum:
     Raises
     ------
     ProtocolError
-        The number of repetitions is not from 1 to `MOST_REPETITIONS`.
+        The number of repetitions is not from 1 to `MAX_REPETITIONS`.
     """
 
     role: str
@@ -132,10 +132,9 @@ class ReadSpectrum:
     device: ClassVar[str] = "spectrometer"
 
     def __post_init__(self) -> None:
-        if not 1 <= self.repetitions <= MOST_REPETITIONS:
+        if not 1 <= self.repetitions <= MAX_REPETITIONS:
             raise ProtocolError(
-                f"expected 1 to {MOST_REPETITIONS} repetitions of a spectrum, got "
-                f"{self.repetitions}"
+                f"expected 1 to {MAX_REPETITIONS} repetitions of a spectrum, got {self.repetitions}"
             )
 
     def __str__(self) -> str:

@@ -168,7 +168,7 @@ UNSATURATED = 1e-3
 START_ORDER, START_KAPPA = 1.7, 0.3
 START_SPEEDS = {1: ((1.0,),), 2: ((3.0, 0.3), (1.5, 0.7))}
 #: Gain in χ² of a step at which fits that are compared end.
-LEAST_GAIN = 0.1
+MIN_GAIN = 0.1
 TOLERANCE = 1e-7
 MAX_ITERATIONS = 150
 #: Largest σ of log κ with which κ is known from above, and gain in χ² over the least κ from which
@@ -375,7 +375,7 @@ class _Problem:
             lower=low,
             upper=high,
             max_iterations=MAX_ITERATIONS,
-            least_gain=LEAST_GAIN,
+            least_gain=MIN_GAIN,
         )
 
     def refined(self, fit: LeastSquaresFit, model: _Model) -> LeastSquaresFit:
@@ -402,7 +402,7 @@ class _Problem:
             lower=low,
             upper=high,
             max_iterations=MAX_ITERATIONS,
-            least_gain=LEAST_GAIN,
+            least_gain=MIN_GAIN,
         )
         return held.chi2 - fit.chi2
 

@@ -134,13 +134,13 @@ class _StateLight(NamedTuple):
 #: Readings nearer than this to a switching of the lamp, in steps between readings, are left out.
 SWITCHING_STEPS = 1.5
 #: Least number of readings under the lamp, and of those after it.
-LEAST_READINGS = 4
+MIN_READINGS = 4
 #: Neighbours whose median is taken for the mean light where σ is not given.
 NEIGHBOURS = 9
 #: Median of the square of a standard normal variable.
 MEDIAN_SQUARE = 0.4549
 #: Least counts in the variance of a reading.
-LEAST_COUNTS = 4.0
+MIN_COUNTS = 4.0
 #: Least light after the lamp, in σ of its mean.
 VISIBLE_SIGMAS = 5.0
 #: Stretches of the charge, of equal times, and of the decay, of equal ratios of times, in which
@@ -226,9 +226,9 @@ def readings_of(
     before = np.flatnonzero(t + exposure < on_s - guard)
     lit = np.flatnonzero((t > on_s + guard) & (t + exposure < off_s - guard))
     after = np.flatnonzero(t > off_s + guard)
-    if min(len(lit), len(after)) < LEAST_READINGS:
+    if min(len(lit), len(after)) < MIN_READINGS:
         raise FitError(
-            f"expected {LEAST_READINGS} readings or more while the lamp is on, from {on_s:g} s to "
+            f"expected {MIN_READINGS} readings or more while the lamp is on, from {on_s:g} s to "
             f"{off_s:g} s, and as many later, got {len(lit)} and {len(after)}; the times are from "
             f"{t[0]:g} s to {t[-1]:g} s"
         )
@@ -282,4 +282,4 @@ def _counting_sigma(parts: list[FloatArray]) -> list[FloatArray]:
     if not bright.any() or not (count := np.median(square[bright] / light[bright])) > 0:
         raise FitError("expected values that scatter, got a smooth curve; give their σ")
     count /= MEDIAN_SQUARE
-    return [np.sqrt(count * np.maximum(level, LEAST_COUNTS * count)) for level in smooth]
+    return [np.sqrt(count * np.maximum(level, MIN_COUNTS * count)) for level in smooth]

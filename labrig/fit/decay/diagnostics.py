@@ -19,19 +19,19 @@ from labrig.foundation.number_format import rounded
 from labrig.results import DecayState, UnseenFlicker
 
 #: Values below which neither is looked for, and first values that are looked at.
-FEWEST_VALUES, MOST_VALUES = 12, 1000
+MIN_VALUES, MAX_VALUES = 12, 1000
 #: Frequencies that are looked at, in values a second of the mean spacing, and periods in the record
 #: from which residuals that repeat are no misfit.
-HIGHEST, FEWEST_PERIODS = 2.5, 6.0
+HIGHEST, MIN_PERIODS = 2.5, 6.0
 #: Frequencies that are computed for each that is independent of the others.
 OVERSAMPLING = 5
 #: Coherence |Σ exp(2πi f t)|/n of the times from which frames are evenly spaced, unless few frames
 #: have it by chance.
 EVEN = 0.6
 #: First values that tell it, and most frequencies.
-MOST_TIMES, MOST_FREQUENCIES = 300, 4000
+MAX_TIMES, MAX_FREQUENCIES = 300, 4000
 #: Part of a flicker below which it does not matter.
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,15 +108,15 @@ def periodogram(
     >>> print(f"{lines.period_s:.1f} s, p < 1e-9: {lines.p_value < 1e-9}")
     5.1 s, p < 1e-9: True
     """
-    rows = np.flatnonzero(signal_to_noise > 0)[:MOST_VALUES]
+    rows = np.flatnonzero(signal_to_noise > 0)[:MAX_VALUES]
     t_s, residuals, signal_to_noise = t_s[rows], residuals[rows], signal_to_noise[rows]
     n_values = len(t_s)
-    if n_values < FEWEST_VALUES or not residuals.any() or not np.ptp(t_s):
+    if n_values < MIN_VALUES or not residuals.any() or not np.ptp(t_s):
         return None
     span_s = float(np.ptp(t_s))
     spacing_s = span_s / (n_values - 1)
     is_even = _coherence(t_s, np.array([1 / spacing_s]))[0] > _even_from(n_values)
-    lowest, highest = FEWEST_PERIODS / span_s, (0.5 if is_even else HIGHEST) / spacing_s
+    lowest, highest = MIN_PERIODS / span_s, (0.5 if is_even else HIGHEST) / spacing_s
     if highest <= lowest:
         return None
     independent = (highest - lowest) * span_s
@@ -153,15 +153,15 @@ def unseen_flicker(t_s: FloatArray, exposure_s: FloatArray) -> UnseenFlicker | N
         None if frames are not evenly spaced, if exposures average the flicker out, or if there are
         too few frames.
     """
-    t_s, exposure_s = t_s[:MOST_TIMES], exposure_s[:MOST_TIMES]
-    if len(t_s) < FEWEST_VALUES or not np.ptp(t_s):
+    t_s, exposure_s = t_s[:MAX_TIMES], exposure_s[:MAX_TIMES]
+    if len(t_s) < MIN_VALUES or not np.ptp(t_s):
         return None
     span_s, steps_s = float(np.ptp(t_s)), np.diff(t_s)
     lowest = 0.5 * len(steps_s) / span_s
     step_s = float(np.median(steps_s))
     # Frames that are close together at first and evenly spaced later have a median step of zero.
     highest = 1.25 / step_s if step_s > 0 else np.inf
-    highest = min(highest, lowest + MOST_FREQUENCIES / (4 * span_s))
+    highest = min(highest, lowest + MAX_FREQUENCIES / (4 * span_s))
     frequencies = np.append(np.arange(lowest, highest, 1 / (4 * span_s)), 1 / max(step_s, 1e-300))
     middle_s = t_s + exposure_s / 2
     coherent = _coherence(middle_s, frequencies)
@@ -170,7 +170,7 @@ def unseen_flicker(t_s: FloatArray, exposure_s: FloatArray) -> UnseenFlicker | N
         return None
     frequency = float(frequencies[best])
     share = float(coherent[best] * np.mean(np.abs(np.sinc(frequency * exposure_s))))
-    return UnseenFlicker(1 / frequency, share) if share > LEAST_SHARE else None
+    return UnseenFlicker(1 / frequency, share) if share > MIN_SHARE else None
 
 
 def _coherence(t_s: FloatArray, frequency_hz: FloatArray) -> FloatArray:
@@ -187,7 +187,7 @@ def _even_from(n_values: int) -> float:
 #: Significance level of each misfit test.
 MISFIT_LEVEL = 5e-4
 #: Number of frames below which the order of residuals is not tested.
-FEWEST_FOR_ORDER = 8
+MIN_FOR_ORDER = 8
 #: Reduced χ² below which σ is doubted: 0.6 of the scatter that it says, if not by chance.
 TOO_SMALL_CHI2 = 0.36
 #: σ of log k from which a rate is said to be known badly: errors of such a rate are far from
@@ -294,7 +294,7 @@ def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> li
 def _outlier_warnings(misfit: Misfit) -> list[str]:
     """Return a warning for each frame that is far from the curve compared with the others."""
     size = np.abs(misfit.frames)
-    if len(size) < FEWEST_FOR_ORDER:
+    if len(size) < MIN_FOR_ORDER:
         return []
     # The median does not mind the outlier, whatever σ and flicker were made of it.
     typical = 1.4826 * float(np.median(size))
@@ -353,7 +353,7 @@ def order_p_value(residuals: FloatArray) -> float:
     """
     n = len(residuals)
     power = float(residuals @ residuals)
-    if n < FEWEST_FOR_ORDER or power == 0:
+    if n < MIN_FOR_ORDER or power == 0:
         return 1.0
     autocorrelation = float(residuals[1:] @ residuals[:-1]) / power
     positive = residuals > 0

@@ -62,7 +62,7 @@ USUAL_FLICKER = 0.01
 LIKELY_FLICKERS = 16
 FLICKER_GRID = 200
 #: Degrees of freedom below which the estimated flicker is unreliable.
-FEWEST_NOISE_DOF = 4.0
+MIN_NOISE_DOF = 4.0
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Envelope:
         Degrees of freedom of the noise estimate: effective frames less those that the curve took.
     flicker, flicker_sigma
         Relative flicker common to the channels of a frame, and σ; with fewer than
-        `FEWEST_NOISE_DOF` degrees of freedom one σ(ρ²) above the estimate.
+        `MIN_NOISE_DOF` degrees of freedom one σ(ρ²) above the estimate.
     likely_flickers
         Equally probable values of ρ after the measurement, or the given one, shape (m,).
     shapes
@@ -266,7 +266,7 @@ def _flicker(
         return sigma, 2 / (sigma**2 * float((weight**3).sum() / weight.sum()))
 
     variance_sigma, dof = error(variance)
-    if dof < FEWEST_NOISE_DOF:
+    if dof < MIN_NOISE_DOF:
         # So few frames tell that a low estimate is an accident: err on the noisy side.
         variance = min(variance + variance_sigma, MAX_FLICKER**2)
         variance_sigma, dof = error(variance)
@@ -433,9 +433,9 @@ SCALED_LEVEL = 5e-4
 #: Log likelihood by which the factor has to be better than flicker: odds of e² = 7 : 1.
 CLEAR_LOG_LIKELIHOOD = 2.0
 #: Least ratio of robust scatter to scatter: below, few values lie far off and the others do not.
-LEAST_ROBUST = 0.6
+MIN_ROBUST = 0.6
 #: Fewest degrees of freedom that tell it.
-FEWEST_DOF = 5.0
+MIN_DOF = 5.0
 #: Values of a flicker that are tried.
 FLICKERS = np.linspace(0.0, MAX_FLICKER, 100)
 
@@ -476,14 +476,14 @@ def sigma_scale(series: DecaySeries, flicker: float | None) -> SigmaScale | None
     free = np.clip(1 - leverage[used], 0.0, 1.0)
     dof = float(free.sum())
     chi2 = float(residual @ residual)
-    if dof < FEWEST_DOF or chdtrc(dof, chi2) > SCALED_LEVEL:
+    if dof < MIN_DOF or chdtrc(dof, chi2) > SCALED_LEVEL:
         return None
     # Where neighbours agree it is no noise: the curve does not describe the signal, or a drift.
     if order_p_value(residual) < MISFIT_LEVEL:
         return None
     factor = float(np.sqrt(chi2 / dof))
     robust = 1.4826 * float(np.median(np.abs(residual)) / np.sqrt(free.mean()))
-    if robust < LEAST_ROBUST * factor:
+    if robust < MIN_ROBUST * factor:
         return None
     if flicker is None:
         brightness2 = ((curve * weights)[used]) ** 2

@@ -17,7 +17,7 @@ from labrig.fit.decay.envelope import (
     with_scatter_sigma,
 )
 from labrig.fit.decay.fit_warnings import (
-    Evidence,
+    FitDiagnostics,
     refuse_if_constant,
     refuse_if_rising,
     student_factor,
@@ -49,10 +49,10 @@ REWEIGHTED_ENOUGH = 1e-6
 #: First fits that tell the σ of residuals, and its factor below which another one follows.
 RESCALINGS = 4
 RESCALED_ENOUGH = 0.3
-FEWEST_FOR_FLICKER = 6
+MIN_FOR_FLICKER = 6
 #: Lifetimes of the fastest state before the first frame from which its light at lamp off, more than
 #: e^5 times as bright, is not told: amplitudes are those at the first frame.
-MOST_LIFETIMES = 5.0
+MAX_LIFETIMES = 5.0
 MAX_STATES = 8
 
 
@@ -219,7 +219,7 @@ def fit_decay(
     result = assemble(
         data,
         chosen,
-        Evidence(
+        FitDiagnostics(
             data=envelope_data,
             noise=smooth,
             scatter=scatter,
@@ -245,7 +245,7 @@ def fit_decay(
 def referred(data: WhitenedSeries, fit: StatesFit) -> WhitenedSeries:
     """Return the data with the time at which amplitudes are told: lamp off, or the first frame."""
     series = data.series
-    if float(np.exp(fit.log_rates.max())) * series.start <= MOST_LIFETIMES:
+    if float(np.exp(fit.log_rates.max())) * series.start <= MAX_LIFETIMES:
         return data
     return replace(data, series=series.from_first_frame())
 
@@ -295,9 +295,9 @@ def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
             "expected σ of the values to tell flicker from other noise, got none; "
             "give σ, or set the flicker to 0"
         )
-    if flicker is None and series.n_frames < FEWEST_FOR_FLICKER:
+    if flicker is None and series.n_frames < MIN_FOR_FLICKER:
         raise FitError(
-            f"expected at least {FEWEST_FOR_FLICKER} frames to estimate flicker, got "
+            f"expected at least {MIN_FOR_FLICKER} frames to estimate flicker, got "
             f"{series.n_frames}; give the flicker (0.007 is common) or record more frames"
         )
     if flicker is not None and not 0 <= flicker < 1:

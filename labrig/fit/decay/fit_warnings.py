@@ -22,7 +22,7 @@ from labrig.fit.decay.diagnostics import (
     small_chi2_warnings,
     state_warnings,
 )
-from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope, SigmaScale
+from labrig.fit.decay.envelope import MIN_NOISE_DOF, Envelope, SigmaScale
 from labrig.fit.decay.further_state import HiddenState
 from labrig.fit.decay.laws import LawFit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation
@@ -42,7 +42,7 @@ from labrig.results import (
     FittedLaw,
     FittedRateSpectrum,
     ScatterSigma,
-    frames_for,
+    recommended_sampling,
     with_uncertainty,
 )
 
@@ -51,7 +51,7 @@ BEND_SIGMAS = 4.0
 #: Change of a fitted parameter in its σ from which a bend matters.
 MATTERS_SIGMAS = 0.5
 #: Part of the bend that weights and offsets must leave over; less is rounding.
-LEAST_OWN = 1e-4
+MIN_OWN = 1e-4
 #: Smallest slope of the parameters that counts as dependent.
 RCOND = 1e-10
 
@@ -110,7 +110,7 @@ def bend(data: WhitenedSeries, fit: StatesFit, covariance: FloatArray) -> Bend |
     nuisance, own, rest = of_ratios[:, :-2], of_ratios[:, -2], of_ratios[:, -1]
     own = own - nuisance @ _solved(nuisance, own)
     own2 = float(own @ own)
-    if own2 <= LEAST_OWN**2 * float(column @ column):
+    if own2 <= MIN_OWN**2 * float(column @ column):
         return None
     rest = rest - nuisance @ _solved(nuisance, rest)
     found = -float(own @ rest) / own2
@@ -171,13 +171,13 @@ RISING_SIGMAS = 5.0
 ROUNDING = 1e-6
 #: Degrees of freedom of an estimated flicker below which its prior makes σ: Student's t then has no
 #: variance. Above, the flicker's own uncertainty is in σ.
-FEWEST_FLICKER_DOF = 2.0
+MIN_FLICKER_DOF = 2.0
 #: Distance in log k from the slowest rate searched below which a rate is at that bound.
 AT_BOUND = 1e-3
 
 
 @dataclass(frozen=True)
-class Evidence:
+class FitDiagnostics:
     """Steps that led to the selected fit.
 
     Attributes
@@ -307,7 +307,7 @@ def warnings_about(
     fit: StatesFit,
     states: tuple[DecayState, ...],
     log_rate_covariance: FloatArray,
-    evidence: Evidence,
+    diagnostics: FitDiagnostics,
     hidden: HiddenState | None,
     correlation: NoiseCorrelation | None,
     bent: Bend | None,
@@ -322,7 +322,7 @@ def warnings_about(
         The fit, and its states in the user's units by falling rate.
     log_rate_covariance
         Covariance of log k of `states`, shape (n, n).
-    evidence
+    diagnostics
         Steps that led to the fit.
     hidden
         A fast state that the data may hide; None if there is no room for one.
@@ -338,21 +338,21 @@ def warnings_about(
             "there are no more values than parameters: nothing is left to test the fit with; "
             "record more"
         )
-    if evidence.noise_dof < FEWEST_NOISE_DOF and evidence.scatter:
+    if diagnostics.noise_dof < MIN_NOISE_DOF and diagnostics.scatter:
         warnings.append(
-            f"σ was taken from the scatter of {max(evidence.noise_dof, 0):.0f} values to spare: "
+            f"σ was taken from the scatter of {max(diagnostics.noise_dof, 0):.0f} values to spare: "
             "give each value's σ in a column sigma, or record more"
         )
-    elif evidence.sigma_scale is not None:
-        factor = rounded(evidence.sigma_scale.factor, 2)
+    elif diagnostics.sigma_scale is not None:
+        factor = rounded(diagnostics.sigma_scale.factor, 2)
         warnings.append(
             f"the values scatter {factor} times as much as their σ says, and it was multiplied by "
             "that: check its column and its unit"
         )
-    elif evidence.noise_dof < FEWEST_FLICKER_DOF:
+    elif diagnostics.noise_dof < MIN_FLICKER_DOF:
         warnings.append(
-            f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
-            "signal: give a flicker measured elsewhere, or record more frames while it is bright"
+            f"flicker was estimated from {max(diagnostics.noise_dof, 1):.0f} frames' worth of "
+            "bright signal: give a flicker measured elsewhere, or record more frames while it is bright"
         )
     if joint.least_squares.creeps:
         warnings.append(
@@ -362,34 +362,34 @@ def warnings_about(
     warnings += [
         f"the fit of {LAW_LABELS[name]} did not end at a minimum: it is not compared with the "
         "others; record longer, or with less noise"
-        for name in evidence.unfinished_laws
+        for name in diagnostics.unfinished_laws
     ]
-    requested = evidence.asked or evidence.n_fixed
+    requested = diagnostics.asked or diagnostics.n_fixed
     if fit.n_states < requested:
         warnings.append(
             f"{requested} states were asked for, the data support {fit.n_states}: "
             f"the others' amplitude is zero; ask for fewer (--states {fit.n_states}) or take more "
             "light"
         )
-    is_exponential = evidence.law == EXPONENTIALS
-    if not is_exponential or evidence.is_another_better:
-        warnings.append(_law_warning(fit, evidence))
-    chosen = joint if evidence.chosen_law is None else evidence.chosen_law.joint
+    is_exponential = diagnostics.law == EXPONENTIALS
+    if not is_exponential or diagnostics.is_another_better:
+        warnings.append(_law_warning(fit, diagnostics))
+    chosen = joint if diagnostics.chosen_law is None else diagnostics.chosen_law.joint
     dof = fit.dof(data) + joint.n_parameters - chosen.n_parameters
-    closer = small_chi2_warnings(chosen.chi2, dof, evidence.scatter is not None)
+    closer = small_chi2_warnings(chosen.chi2, dof, diagnostics.scatter is not None)
     warnings += closer
     # The order of residuals that are far smaller than any scatter is that of rounding errors.
-    of_residuals = evidence.scatter is not None and evidence.scatter.is_of_residuals
+    of_residuals = diagnostics.scatter is not None and diagnostics.scatter.is_of_residuals
     is_exact = of_residuals and float(series.inverse_sigma.max()) * ROUNDING > 1
-    is_rounding = (bool(closer) and evidence.scatter is not None) or is_exact
-    if not is_rounding and evidence.law != RATE_SPECTRUM:
-        law = evidence.chosen_law
-        judged = (data, joint) if law is None else (evidence.data, law.joint)
+    is_rounding = (bool(closer) and diagnostics.scatter is not None) or is_exact
+    if not is_rounding and diagnostics.law != RATE_SPECTRUM:
+        law = diagnostics.chosen_law
+        judged = (data, joint) if law is None else (diagnostics.data, law.joint)
         number = "1 exponential does" if fit.n_states == 1 else f"{fit.n_states} exponentials do"
         warnings += misfit_warnings(
-            _misfit(*judged, evidence, bent),
-            number if is_exponential else f"{LAW_LABELS[evidence.law]} does",
-            f"{_advice(fit, evidence)}; check background and times (labrig fit decay --offset, "
+            _misfit(*judged, diagnostics, bent),
+            number if is_exponential else f"{LAW_LABELS[diagnostics.law]} does",
+            f"{_advice(fit, diagnostics)}; check background and times (labrig fit decay --offset, "
             "--origin, --from)",
         )
     warnings += bend_warnings(bent)
@@ -413,18 +413,18 @@ def warnings_about(
         log_rate_covariance,
         series.span_s,
         (float(np.exp(low)) / series.span_s, float(np.exp(high)) / series.span_s),
-        evidence.all_needed,
+        diagnostics.all_needed,
         free_offset,
     )
 
 
-def _advice(fit: StatesFit, evidence: Evidence) -> str:
+def _advice(fit: StatesFit, diagnostics: FitDiagnostics) -> str:
     """Return what there is to try if the residuals say that the shape is wrong."""
-    if fit.n_states == evidence.asked:
+    if fit.n_states == diagnostics.asked:
         return f"allow more states (--states {fit.n_states + 1})"
-    if evidence.is_another_better:
+    if diagnostics.is_another_better:
         return "see the other laws that were fitted (--law)"
-    if fit.n_states < evidence.most_states:
+    if fit.n_states < diagnostics.most_states:
         return (
             f"{fit.n_states + 1} states were tried, the data do not support them, and no other law "
             "describes it clearly better"
@@ -437,7 +437,7 @@ def _hidden_warning(hidden: HiddenState, n_states: int, span_s: float) -> str:
     return (
         f"a state {n_states + 1} of about {100 * hidden.share:.0f} % with a lifetime around "
         f"{lifetime_s:.2g} s may hide in the first frames, which do not tell it; σ allows for it: "
-        f"take {frames_for(lifetime_s)}"
+        f"take {recommended_sampling(lifetime_s)}"
     )
 
 
@@ -452,11 +452,11 @@ def _common_signal(
     return common, information
 
 
-def _law_warning(fit: StatesFit, evidence: Evidence) -> str:
+def _law_warning(fit: StatesFit, diagnostics: FitDiagnostics) -> str:
     """Return what it means for the rates that another law describes the decay."""
-    laws = evidence.other_laws
-    law = next((law for law in laws if law.name == evidence.law), laws[0])
-    gain = evidence.exponentials_bic - law.bic
+    laws = diagnostics.other_laws
+    law = next((law for law in laws if law.name == diagnostics.law), laws[0])
+    gain = diagnostics.exponentials_bic - law.bic
     number = f"{fit.n_states} exponential{'s' if fit.n_states > 1 else ''}"
     how = f"better than {number} (ΔBIC {rounded(gain, 2)})" if gain > 0 else f"beside {number}"
     return (
@@ -465,7 +465,9 @@ def _law_warning(fit: StatesFit, evidence: Evidence) -> str:
     )
 
 
-def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence, bent: Bend | None) -> Misfit:
+def _misfit(
+    data: WhitenedSeries, joint: JointFit, diagnostics: FitDiagnostics, bent: Bend | None
+) -> Misfit:
     """Return the residuals to test; an evident bend of the sensor is not told twice."""
     series = data.series
     frames, squared_snr = joint.frame_residuals(data)
@@ -481,7 +483,7 @@ def _misfit(data: WhitenedSeries, joint: JointFit, evidence: Evidence, bent: Ben
         frame_dof=n_frames - along,
         colour_chi2=colour_chi2,
         colour_dof=series.n_values - n_frames - across,
-        noise_dof=evidence.noise_dof,
+        noise_dof=diagnostics.noise_dof,
         middle_s=series.t_s + series.exposure * series.span_s / 2,
         signal_to_noise=np.sqrt(squared_snr),
         repeat=series.repeat,

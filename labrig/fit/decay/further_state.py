@@ -32,7 +32,7 @@ PRIOR_ODDS = 0.2
 USUAL_SHARE = 0.4
 #: Lifetimes before the first frame beyond which a state was all of the light at lamp off: e^300 is
 #: near the largest number.
-LARGEST_PHASE = 300.0
+MAX_PHASE = 300.0
 #: Ratio to the fastest rate found from which a further state is a fast one.
 FASTER = 2.0
 #: Chance from which a hidden state counts: below, the data do not support it, and a σ that covered
@@ -43,7 +43,7 @@ LIMIT = 0.95
 #: Fall of χ² from which a further state is shown, not hidden: fewer were asked for, or allowed.
 SHOWN_GAIN = 40.0
 #: Part of an exponential that the fitted parameters must leave over; less is rounding.
-LEAST_OWN = 1e-4
+MIN_OWN = 1e-4
 #: Smallest slope of the others' parameters that counts as dependent.
 RCOND = 1e-10
 
@@ -85,7 +85,7 @@ def further_state(data: WhitenedSeries, fit: StatesFit, log_rates: FloatArray) -
     effect = -np.linalg.lstsq(jacobian / scale, columns, rcond=RCOND)[0] / scale[:, None]
     own = columns + jacobian @ effect
     own2 = np.einsum("ij,ij->j", own, own)
-    is_own = own2 > LEAST_OWN**2 * np.einsum("ij,ij->j", columns, columns)
+    is_own = own2 > MIN_OWN**2 * np.einsum("ij,ij->j", columns, columns)
     own2 = np.where(is_own, own2, np.inf)
     amplitude = -(own.T @ solution.residuals) / own2
     return FurtherState(
@@ -148,7 +148,7 @@ class FastStates:
     def share(self, amplitude: FloatArray, data: WhitenedSeries, fit: StatesFit) -> FloatArray:
         """Return the shares of amplitudes at the first frame in all light at lamp off, (m,)."""
         start = data.series.start
-        phases = np.minimum(np.exp(self.further.log_rates) * start, LARGEST_PHASE)
+        phases = np.minimum(np.exp(self.further.log_rates) * start, MAX_PHASE)
         at_lamp_off = amplitude * np.exp(phases)
         others = float(fit.amplitudes @ np.exp(np.exp(fit.log_rates) * start))
         return np.asarray(at_lamp_off / (at_lamp_off + others))

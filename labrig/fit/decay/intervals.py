@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.decay.fit_warnings import Evidence
+from labrig.fit.decay.fit_warnings import FitDiagnostics
 from labrig.fit.decay.laws import LawFit
 from labrig.fit.decay.series import WhitenedSeries
 from labrig.fit.decay.states import StatesFit, exponentials
@@ -50,7 +50,7 @@ def decay_intervals(
     fit: StatesFit,
     covariance: FloatArray,
     laws: Iterable[LawFit],
-    evidence: Evidence,
+    diagnostics: FitDiagnostics,
 ) -> tuple[dict[str, ProfileInterval], list[str]]:
     """Return the intervals of a decay's states and its law, and warnings about them.
 
@@ -60,20 +60,24 @@ def decay_intervals(
         Whitened series, the fit at its minimum, and the covariance of its parameters, (p, p).
     laws
         Other laws that were fitted, with their final covariance.
-    evidence
+    diagnostics
         Steps that led to the fit.
     """
-    student, dof, all_of_them = evidence.student, evidence.sigma_dof, evidence.all_intervals
+    student, dof, all_of_them = (
+        diagnostics.student,
+        diagnostics.sigma_dof,
+        diagnostics.all_intervals,
+    )
     if not math.isfinite(student):
         student, covariance = 1.0, fit.joint.least_squares.covariance
     each = []
     # Of exponentials that only describe another law, σ is enough unless more is asked for.
-    if all_of_them or evidence.law == EXPONENTIALS:
+    if all_of_them or diagnostics.law == EXPONENTIALS:
         each.append(rate_intervals(data, fit, covariance / student, dof, all_of_them=all_of_them))
     each += [
-        law_intervals(evidence.data, law, student, dof, all_of_them=all_of_them)
+        law_intervals(diagnostics.data, law, student, dof, all_of_them=all_of_them)
         for law in laws
-        if law.fitted.name == evidence.law
+        if law.fitted.name == diagnostics.law
     ]
     warnings = [
         f"along the profile of {' and '.join(part.without)} χ² falls below that of the fit, which "

@@ -58,13 +58,13 @@ FASTEST_STEPS, SLOWEST_SPANS = 100.0, 100.0
 #: Sizes of the grid of rates and shapes, smallest shape above 0 on it, and most of its basins from
 #: which a search starts.
 GRID = (36, 16)
-LEAST_SHAPE = 1e-5
-MOST_BASINS = 4
+MIN_SHAPE = 1e-5
+MAX_BASINS = 4
 #: Steps in time, relative to the time since the first frame, within which frames are merged: for
 #: the grid, which only shows where to start, and for the search.
 GRID_MERGED, MERGED = 0.05, 0.01
 #: Steps of a search of the rate at each shape, and of both.
-PROFILE_STEPS, MOST_STEPS = 4, 60
+PROFILE_STEPS, MAX_STEPS = 4, 60
 #: First damping, and its factors after a step that descends and after another one.
 DAMPING, LESS, MORE = 1e-3, 0.1, 4.0
 #: Gain in χ² of a step at which a search ends.
@@ -102,7 +102,7 @@ def law_minima(data: WhitenedSeries, law: DecayLaw, weights: FloatArray) -> Floa
     least, largest = law.shapes
     frames = _Frames.of(data, weights)
     log_rates = np.linspace(low, high, GRID[0])
-    shapes = np.geomspace(max(least, LEAST_SHAPE), largest, GRID[1])
+    shapes = np.geomspace(max(least, MIN_SHAPE), largest, GRID[1])
     with_limits = np.append(shapes, law.limits)
     gains = frames.merged(GRID_MERGED).gains(law, log_rates, with_limits)
     frames = frames.merged(MERGED)
@@ -118,14 +118,14 @@ def law_minima(data: WhitenedSeries, law: DecayLaw, weights: FloatArray) -> Floa
     starts = np.concatenate(
         [profile.x[is_start], np.column_stack([log_rates[places[1]], shapes[places[0]]])]
     )
-    return frames.descended(law, starts, [low, least], [high, largest], MOST_STEPS).lowest()
+    return frames.descended(law, starts, [low, least], [high, largest], MAX_STEPS).lowest()
 
 
 def _basins(gains: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the places of the highest gains of a grid that are higher than all around them."""
     is_basin = (gains == maximum_filter(gains, size=3, mode="nearest")) & (gains > 0)
     rows, columns = np.nonzero(is_basin)
-    best = np.argsort(-gains[rows, columns], kind="stable")[:MOST_BASINS]
+    best = np.argsort(-gains[rows, columns], kind="stable")[:MAX_BASINS]
     return rows[best], columns[best]
 
 
@@ -346,7 +346,7 @@ class LawFit:
         h, _ = _shape(series, DECAY_LAWS[self.fitted.name])(self.joint.shape)
         return np.multiply.outer(h, self.joint.weights)
 
-    def with_added(self, covariance: FloatArray, series: DecaySeries) -> "LawFit":
+    def with_inflated_covariance(self, covariance: FloatArray, series: DecaySeries) -> "LawFit":
         """Return the fit with a covariance (p, p) added to its own."""
         total = self.covariance + covariance
         if self.covariance[LAW_SHAPE, LAW_SHAPE] == 0:

@@ -38,7 +38,7 @@ from labrig.foundation.arrays import FloatArray
 FLICKERS = MAX_FLICKER * np.linspace(0, 1, 100) ** 2
 #: Variance over that assumed where the flicker assumed is all of it and less is tried: rounding
 #: may else make it negative.
-LEAST_FACTOR = 1e-12
+MIN_FACTOR = 1e-12
 #: Relative error of values and models by rounding: smaller residuals say nothing of a model.
 ROUNDING = 1e-13
 
@@ -72,7 +72,7 @@ class NoiseLikelihood:
         return cls(
             data,
             signal / length[:, None],
-            np.maximum(1 + np.multiply.outer(added, brightness2), LEAST_FACTOR),
+            np.maximum(1 + np.multiply.outer(added, brightness2), MIN_FACTOR),
         )
 
     def deviance(self, residuals: FloatArray) -> float:
@@ -124,18 +124,18 @@ TOLD = 5.0
 #: the data; half a Cauchy distribution, as for the independent flicker, has no mean square.
 FACTORS = np.geomspace(0.5, 4.0, 7)
 #: Values below which no correlation is told, and number of first values that tell it.
-FEWEST_VALUES, MOST_VALUES = 12, 100
+MIN_VALUES, MAX_VALUES = 12, 100
 #: Diagonal of a triangular factor that stands for 0, and variance that is always independent.
 TINY, INDEPENDENT = 1e-300, 1e-6
 #: Least estimate: a flicker that drifts with the decay leaves hardly any scatter about a curve.
-LEAST_FLICKER = 0.002
+MIN_FLICKER = 0.002
 #: Number of σ, the probability beyond which is that of a normal distribution, and steps of a search
 #: by halves.
 TAIL_SIGMAS, BISECTIONS = 3.0, 20
 #: Part of a variance, below which what is added to it does not matter.
-LEAST_ADDED = 1e-3
+MIN_ADDED = 1e-3
 #: Mean part of the variance from which it matters whether it correlates.
-LEAST_FRACTION = 0.1
+MIN_FRACTION = 0.1
 
 
 @dataclass(frozen=True)
@@ -299,7 +299,7 @@ def noise_correlation(
     ):
         return None
     left = _Deviations.of(data, joint, signal)
-    if len(left.deviation) < FEWEST_VALUES:
+    if len(left.deviation) < MIN_VALUES:
         return None
     kept = _kept(data, joint)
     n_values = data.values.size
@@ -307,11 +307,11 @@ def noise_correlation(
     parts = {
         name: part
         for name, part in left.parts(data, noise, len(kept)).items()
-        if (part.size**2).mean() > LEAST_FRACTION
+        if (part.size**2).mean() > MIN_FRACTION
     }
     if not parts or _ends_below_zero(left.deviation + left.brightness):
         return None
-    told = slice(0, MOST_VALUES)
+    told = slice(0, MAX_VALUES)
     deviation, design = left.deviation[told], left.jacobian[told][:, kept]
     log_posteriors = {
         name: _log_restricted_likelihoods(
@@ -366,7 +366,7 @@ def _parts(
     parts = {}
     if not noise.is_given or noise.flicker > 0:
         # A flicker that was given may be wrong, too: a scatter that is small is no long memory.
-        flicker = max(noise.flicker, LEAST_FLICKER)
+        flicker = max(noise.flicker, MIN_FLICKER)
         size = flicker * brightness
         log_prior = -2 * np.log1p((flicker * FACTORS / USUAL_FLICKER) ** 2)
         rest = np.maximum(1 - (noise.flicker * brightness) ** 2, 0.0)
@@ -411,7 +411,7 @@ def _tail_factors(
     probability
         Probability that the noise correlates.
     """
-    changed = (own > 0) & (added > LEAST_ADDED * own) & (typical > LEAST_ADDED * own)
+    changed = (own > 0) & (added > MIN_ADDED * own) & (typical > MIN_ADDED * own)
     if not changed.any():
         return np.ones(0)
     own, added, typical = own[changed], added[changed], typical[changed]

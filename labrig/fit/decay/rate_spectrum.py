@@ -25,7 +25,7 @@ RATES = 28
 #: offset cancel: the signal would be as uncertain as one likes.
 SLOWEST_BESIDE_OFFSET = -float(np.log(3.0))
 #: Largest decay exponent k t from lamp off to the first frame: squares overflow beyond e^300.
-LARGEST_PHASE = 300.0
+MAX_PHASE = 300.0
 #: Strengths of the penalty relative to the data's own information on an amplitude. Below, a
 #: spectrum is no longer smooth: it is a few exponentials.
 STRENGTHS = 10.0 ** np.arange(-6.0, 0.1, 0.5)
@@ -69,7 +69,7 @@ def fit_rate_spectrum(
     problem = projection(data, weights)
     low, high = series.log_rate_bounds
     if series.start > 0:
-        high = min(high, float(np.log(LARGEST_PHASE / series.start)))
+        high = min(high, float(np.log(MAX_PHASE / series.start)))
     if np.isinf(series.offset_sigma).any():
         low = max(low, SLOWEST_BESIDE_OFFSET)
     rates = np.exp(np.linspace(low, high, RATES))

@@ -12,7 +12,7 @@ import numpy as np
 
 from labrig.fit.decay.diagnostics import unseen_flicker
 from labrig.fit.decay.envelope import Envelope
-from labrig.fit.decay.fit_warnings import Evidence, bend, warnings_about
+from labrig.fit.decay.fit_warnings import FitDiagnostics, bend, warnings_about
 from labrig.fit.decay.further_state import FastStates, drift_effect, fast_states, hidden_state
 from labrig.fit.decay.intervals import decay_intervals
 from labrig.fit.decay.laws import LAW_RATE, LawFit
@@ -98,25 +98,25 @@ class DecayFit(FittedDecay):
     drift_effect_s: FloatArray
 
 
-def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayFit:
+def assemble(data: WhitenedSeries, fit: StatesFit, diagnostics: FitDiagnostics) -> DecayFit:
     """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
-    fitted_covariance = _fitted_covariance(fit, data, evidence)
+    fitted_covariance = _fitted_covariance(fit, data, diagnostics)
     # Unweighted least squares: σ is that of the curvature, as every program's.
-    is_plain = evidence.scatter is not None and evidence.scatter.is_of_residuals
+    is_plain = diagnostics.scatter is not None and diagnostics.scatter.is_of_residuals
     fast = None if is_plain else fast_states(data, fit)
     hidden = None if fast is None else hidden_state(data, fit, fast)
     if hidden is not None:
         fitted_covariance = fitted_covariance + hidden.covariance
-    correlation = None if is_plain else _noise_correlation(data, fit, evidence)
-    laws = evidence.laws
+    correlation = None if is_plain else _noise_correlation(data, fit, diagnostics)
+    laws = diagnostics.laws
     if correlation is not None:
         fitted_covariance = fitted_covariance + correlation.added_covariance(
             data, joint, fit.signal(series)
         )
-        laws = tuple(_with_correlation(each, evidence.data, correlation) for each in laws)
+        laws = tuple(_with_correlation(each, diagnostics.data, correlation) for each in laws)
     covariance, log_rate_covariance = _covariances(fit, data, fitted_covariance)
-    intervals, interval_warnings = decay_intervals(data, fit, fitted_covariance, laws, evidence)
+    intervals, interval_warnings = decay_intervals(data, fit, fitted_covariance, laws, diagnostics)
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates[order]) / series.span_s
     amplitudes = (fit.amplitudes * np.exp(np.exp(fit.log_rates) * series.start))[
@@ -151,8 +151,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         offsets_sigma=tuple(sigma[2 * fit.n_states :].tolist()),
         repeats=series.repeats,
         levels=tuple(series.levels.tolist()),
-        flicker=evidence.noise.flicker,
-        flicker_sigma=evidence.noise.flicker_sigma,
+        flicker=diagnostics.noise.flicker,
+        flicker_sigma=diagnostics.noise.flicker_sigma,
         chi2=joint.chi2,
         dof=fit.dof(data),
         bic=joint.chi2 + joint.n_parameters * float(np.log(data.independent_data(joint.weights))),
@@ -163,23 +163,23 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
                 fit,
                 states,
                 log_rate_covariance[np.ix_(order, order)],
-                evidence,
+                diagnostics,
                 hidden,
                 correlation,
                 bend(data, fit, fitted_covariance),
             ),
             *interval_warnings,
         ),
-        candidates=evidence.candidates,
-        law=evidence.law,
+        candidates=diagnostics.candidates,
+        law=diagnostics.law,
         laws=tuple(each.fitted for each in laws),
-        rate_spectrum=evidence.rate_spectrum,
+        rate_spectrum=diagnostics.rate_spectrum,
         measured_until_s=series.first_s + float((series.t + series.exposure).max()) * series.span_s,
         reference=(
             DecayReference() if series.reference_s == 0 else first_row_at(series.reference_s)
         ),
-        scatter=evidence.scatter,
-        sigma_factor=evidence.sigma_scale.factor if evidence.sigma_scale else 1.0,
+        scatter=diagnostics.scatter,
+        sigma_factor=diagnostics.sigma_scale.factor if diagnostics.sigma_scale else 1.0,
         # A likely one is told, and is in σ.
         unseen_state=(
             None
@@ -239,23 +239,25 @@ def _unseen_flicker(series: DecaySeries) -> UnseenFlicker | None:
 
 
 def _noise_correlation(
-    data: WhitenedSeries, fit: StatesFit, evidence: Evidence
+    data: WhitenedSeries, fit: StatesFit, diagnostics: FitDiagnostics
 ) -> NoiseCorrelation | None:
     """Return how the noise correlates about the law that describes the decay."""
-    law, noise = evidence.chosen_law, evidence.noise
+    law, noise = diagnostics.chosen_law, diagnostics.noise
     if law is None:
         rates = slice(0, 2 * fit.n_free, 2)
         return noise_correlation(data, fit.joint, fit.signal(data.series), rates, noise)
-    signal = law.signal(evidence.data.series)
-    return noise_correlation(evidence.data, law.joint, signal, LAW_RATE, noise)
+    signal = law.signal(diagnostics.data.series)
+    return noise_correlation(diagnostics.data, law.joint, signal, LAW_RATE, noise)
 
 
 def _with_correlation(law: LawFit, data: WhitenedSeries, correlation: NoiseCorrelation) -> LawFit:
     added = correlation.added_covariance(data, law.joint, law.signal(data.series))
-    return law.with_added(added, data.series)
+    return law.with_inflated_covariance(added, data.series)
 
 
-def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> FloatArray:
+def _fitted_covariance(
+    fit: StatesFit, data: WhitenedSeries, diagnostics: FitDiagnostics
+) -> FloatArray:
     """Return the covariance of the fitted parameters (p, p), with the noise's uncertainty in it.
 
     An estimated flicker is marginalised: the covariance is the mean over its likely values. Where
@@ -263,13 +265,13 @@ def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, evidence: Evidence)
     Student's t, as it does where σ is the scatter's: then the variance is ν/(ν − 2) times larger.
     There a misfit of the model is allowed for, too.
     """
-    covariance, noise = fit.joint.least_squares.covariance, evidence.noise
-    if evidence.scatter is not None and evidence.scatter.is_of_residuals:
+    covariance, noise = fit.joint.least_squares.covariance, diagnostics.noise
+    if diagnostics.scatter is not None and diagnostics.scatter.is_of_residuals:
         return covariance
-    if evidence.scatter is not None:
-        return with_misfit(covariance, fit, data, noise) * evidence.student
-    if evidence.sigma_scale is not None:
-        return covariance * evidence.student
+    if diagnostics.scatter is not None:
+        return with_misfit(covariance, fit, data, noise) * diagnostics.student
+    if diagnostics.sigma_scale is not None:
+        return covariance * diagnostics.student
     if noise.is_given:
         return covariance
     added_square = noise.added_square(noise.flicker)

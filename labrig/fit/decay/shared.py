@@ -13,7 +13,7 @@ import nlopt
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
-from labrig.fit.decay.fit import MOST_LIFETIMES
+from labrig.fit.decay.fit import MAX_LIFETIMES
 from labrig.fit.decay.selection import F_TEST_LEVEL, REFUTING_BIC
 from labrig.fit.decay.series import FASTEST_DECAYS, NO_DECAY, SLOWEST_SPANS
 from labrig.fit.decay.states import ILL_DETERMINED, MERGED_LOG_RATE, NEGLIGIBLE_AMPLITUDE
@@ -235,7 +235,7 @@ class _Problem:
     def _search(self, n_states: int) -> FloatArray:
         """Return log rates near the global best."""
         low, high = self.log_rate_bounds
-        grid = np.linspace(low, high, min(grid_size(n_states), MOST_ON_GRID[n_states]))
+        grid = np.linspace(low, high, min(grid_size(n_states), MAX_ON_GRID[n_states]))
         sets = [np.array(each) for each in combinations(grid, n_states)]
         best = min(sets, key=self.chi2)
         if n_states == 1:
@@ -299,7 +299,7 @@ class _Problem:
 
 
 #: Largest grids of the search, by the number of states: the tables' amplitudes are exact.
-MOST_ON_GRID = {1: 36, 2: 18, 3: 12}
+MAX_ON_GRID = {1: 36, 2: 18, 3: 12}
 
 
 @dataclass(frozen=True)
@@ -402,7 +402,7 @@ def _result(fit: _Fit, candidates: tuple[Candidate, ...], equal_weights: bool) -
     for table, own in problem.parameters(n):
         first_s = float(table.table.t_s.min())
         start = first_s / problem.span_s
-        from_lamp_off = start >= 0 and rates.max() * start <= MOST_LIFETIMES
+        from_lamp_off = start >= 0 and rates.max() * start <= MAX_LIFETIMES
         references.append(DecayReference() if from_lamp_off else first_row_at(first_s))
         start = start if from_lamp_off else 0.0
         for rank, i in enumerate(order):

@@ -160,7 +160,7 @@ def fit_states(
     start[2 * n_free :] = amplitudes[n_free:]
     limits = CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE
     fit = _fit_from(data, start, fixed, weights, offsets, *limits, CANDIDATE_GAIN)
-    creeps = fit.joint.least_squares.ending is Ending.CREEPING
+    creeps = fit.joint.least_squares.ending is Ending.SLOW_PROGRESS
     if creeps and fit.joint.chi2 < needed_chi2:
         joint = fit.joint
         fit = _fit_from(data, joint.shape, fixed, joint.weights, joint.offsets, *limits)

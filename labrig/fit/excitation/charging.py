@@ -13,7 +13,7 @@ from labrig.results import Closure, spans_decades
 #: Number of points of the predicted curve.
 POINTS = 200
 #: Least κ in 1/s: no state gets so little light that it matters.
-LEAST_KAPPA = 1e-12
+MIN_KAPPA = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Charging:
 
         Of P sites with `r0` (P, n, m) the levels are averaged.
         """
-        kappa = np.maximum(self.k_e_per_s @ self.irradiance, LEAST_KAPPA)
+        kappa = np.maximum(self.k_e_per_s @ self.irradiance, MIN_KAPPA)
         k_r, order = self.k_r_per_s, self.kinetic_order
         charged = lit_concentration(r0, kappa, k_r, order, charge_s[:, np.newaxis])
         begins = dark_concentration(charged, k_r, order, dark_s[:, np.newaxis])

@@ -25,7 +25,7 @@ UNKNOWN, LEAST = 1.5, 1e-3
 #: Least σ of a logarithm: bands agree with the course so far.
 AGREEMENT = 0.02
 #: Largest step of ln k, largest last one, and number of steps.
-LARGEST_STEP, DONE, STEPS = 1.0, 1e-6, 50
+MAX_STEP, DONE, STEPS = 1.0, 1e-6, 50
 #: Part of the variance that the error modes may leave out.
 LEFT_OUT = 1e-4
 
@@ -108,7 +108,7 @@ def _posterior(
         misfit = log_level - np.log(total) + slope @ (course - expected)
         spread = slope @ prior @ slope.T + np.diag(noise**2)
         gain = np.linalg.solve(spread, slope @ prior).T
-        step = np.clip(expected + gain @ misfit - course, -LARGEST_STEP, LARGEST_STEP)
+        step = np.clip(expected + gain @ misfit - course, -MAX_STEP, MAX_STEP)
         course = course + step
         if np.abs(step).max() < DONE:
             break

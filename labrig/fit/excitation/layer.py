@@ -42,7 +42,7 @@ LOOKED_UP = 81
 #: Steps into which a transient of the lamp is divided.
 PARTS = 4
 #: Gains in χ² of a step at which a fit ends that only tells the absorption, and another one.
-ROUGH_GAIN, LEAST_GAIN = 0.1, 0.01
+ROUGH_GAIN, MIN_GAIN = 0.1, 0.01
 TOLERANCE = 1e-4
 #: Numbers of evaluations after which a fit ends that is far out, and any other.
 FAR_ITERATIONS, MAX_ITERATIONS = 10, 40
@@ -128,7 +128,7 @@ def layer_effect(
         for course, absorption in zip(courses, COURSES, strict=True):
             layer = course[-1]
             # Absorption follows k_e, which follows from absorption.
-            for gain in (LEAST_GAIN,) if absorption is _grey else (ROUGH_GAIN, LEAST_GAIN):
+            for gain in (MIN_GAIN,) if absorption is _grey else (ROUGH_GAIN, MIN_GAIN):
                 by_band = np.minimum(tried * absorption(layer), largest_density)
                 layer = layers.fitted(by_band, layer, gain, best + far_out)
             course.append(layer)
@@ -243,7 +243,7 @@ def _minimum(
     problem: ExcitationProblem,
     theta: FloatArray,
     mean_light: FloatArray,
-    least_gain: float = LEAST_GAIN,
+    least_gain: float = MIN_GAIN,
     far_chi2: float = np.inf,
 ) -> _Layer:
     lower, upper = problem.parameters.bounds()

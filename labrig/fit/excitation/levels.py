@@ -15,7 +15,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.excitation.charging import LEAST_KAPPA
+from labrig.fit.excitation.charging import MIN_KAPPA
 from labrig.foundation.arrays import FloatArray, IntArray
 from labrig.material import dark_step, lit_step, mean_emission, phi1, phi2, relaxation_with_slopes
 from labrig.results import Charge, ChargingSeries, Transient
@@ -414,7 +414,7 @@ class _Sample(NamedTuple):
     def in_steady_light(self, state: _State, brightness: float, duration_s: float) -> _State:
         """Return the state after constant light."""
         light = brightness * self.irradiance
-        kappa = np.maximum(light @ self.k_e_per_s.T, LEAST_KAPPA)
+        kappa = np.maximum(light @ self.k_e_per_s.T, MIN_KAPPA)
         step = lit_step(state.value, kappa, self.k_r_per_s, self.order, duration_s)
         by_k_e = step.by_kappa[..., None] * light[:, None, :]
         return state.stepped(step.value, step.by_start, step.by_k_r, step.by_order, by_k_e)

@@ -15,9 +15,9 @@ from labrig.results import ChargingSeries
 
 #: Amplitudes over the largest value: of a state which is not there, and of one so far from
 #: saturation that its amplitude is without influence.
-LEAST_AMPLITUDE, LARGEST_AMPLITUDE = 1e-9, 1e9
+MIN_AMPLITUDE, MAX_AMPLITUDE = 1e-9, 1e9
 #: Rate in 1/s below every one that a charge can tell from none; its logarithm is finite.
-LEAST_RATE_PER_S = 1e-30
+MIN_RATE_PER_S = 1e-30
 
 
 class Rates(NamedTuple):
@@ -215,8 +215,8 @@ class Parameters:
         brightest = max(float(np.nanmax(charging.values)) for charging in series)
         self.order = order
         self._unit = brightest if order is None else 1.0
-        self._least_gain = LEAST_AMPLITUDE * brightest / self._unit
-        self._largest_gain = LARGEST_AMPLITUDE * brightest / self._unit
+        self._least_gain = MIN_AMPLITUDE * brightest / self._unit
+        self._largest_gain = MAX_AMPLITUDE * brightest / self._unit
         self.others = [channel for channel in range(channels) if channel != reference]
         is_scaled = uncertain.scale > 0
         self.scaled = [
@@ -274,7 +274,7 @@ class Parameters:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return bounds of θ: rates, weights, veil and start ≥ 0, amplitudes in their range."""
         lower, upper = np.full(self.count, -np.inf), np.full(self.count, np.inf)
-        lower[self.columns.k_r] = np.log(LEAST_RATE_PER_S)
+        lower[self.columns.k_r] = np.log(MIN_RATE_PER_S)
         lower[self.columns.growth.start : self.columns.weights.stop] = 0.0
         lower[self.columns.inverse_gain] = 1 / self._largest_gain
         upper[self.columns.inverse_gain] = 1 / self._least_gain

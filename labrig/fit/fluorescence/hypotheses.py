@@ -33,7 +33,7 @@ from labrig.fit.fluorescence.surface_prior import (
 from labrig.fit.fluorescence.system import FluorescenceSystem
 from labrig.foundation.arrays import FloatArray
 
-MOST_FLUOROPHORES = 3
+MAX_FLUOROPHORES = 3
 #: Prior probability that a surface does not fluoresce, and that it has one fluorophore more.
 NOT_FLUORESCENT, ONE_MORE = 0.5, 0.1
 #: Number of pairs of fluorophores that are adjusted, and to which a third one is added.
@@ -257,7 +257,7 @@ class Hypotheses:
         """Correlation (i, i) of an emission's deviations when light of two wavelengths excites."""
         return deviation_correlation(self.system.input_nm)
 
-    def scored(self, measured: Measured, most: int = MOST_FLUOROPHORES) -> list[Scored]:
+    def scored(self, measured: Measured, most: int = MAX_FLUOROPHORES) -> list[Scored]:
         """Return the best hypotheses of each number of fluorophores.
 
         Unlike surfaces they are not bounded here, so that emissions deviate less from their shapes:

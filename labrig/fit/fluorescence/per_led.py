@@ -27,14 +27,14 @@ from labrig.optics import Spectrum, band_means, edges_from_centres
 #: ε of equation 4.5, and distance below which two peaks are one, in nm.
 EPSILON_NM, MERGED_NM = 15.0, 30.0
 #: Least a₁, and largest a₁ and a₂, relative to the light's height.
-LEAST_HEIGHT, LARGEST_HEIGHT = 0.1, 20.0
+MIN_HEIGHT, MAX_HEIGHT = 0.1, 20.0
 #: Bounds of σ₂ in nm.
 EMISSION_SIGMA_NM = (10.0, 40.0)
 #: Start: a₁, a₂, μ₂ − λ_m and σ₂.
 START = (0.5, 0.1, 60.0, 25.0)
 STEP_NM = 1.0
 TOLERANCE = 1e-10
-MOST_EVALUATIONS = 500
+MAX_EVALUATIONS = 500
 AREA = math.sqrt(2 * math.pi)
 
 
@@ -211,10 +211,10 @@ def _fitted(
         return float(residual @ residual)
 
     start_height, start_emission, shift_nm, start_sigma = START
-    low = [LEAST_HEIGHT, light.mean_nm - EPSILON_NM, sigmas_nm[0]]
+    low = [MIN_HEIGHT, light.mean_nm - EPSILON_NM, sigmas_nm[0]]
     low += [0.0, light.mean_nm + EPSILON_NM, EMISSION_SIGMA_NM[0]]
-    high = [LARGEST_HEIGHT, light.mean_nm + EPSILON_NM, sigmas_nm[1]]
-    high += [LARGEST_HEIGHT, float(nodes_nm[-1]), EMISSION_SIGMA_NM[1]]
+    high = [MAX_HEIGHT, light.mean_nm + EPSILON_NM, sigmas_nm[1]]
+    high += [MAX_HEIGHT, float(nodes_nm[-1]), EMISSION_SIGMA_NM[1]]
     start = [start_height, light.mean_nm, light.sigma_nm, start_emission]
     start += [min(light.mean_nm + shift_nm, high[4]), start_sigma]
     search = nlopt.opt(nlopt.LD_SLSQP, 6)
@@ -222,7 +222,7 @@ def _fitted(
     search.set_lower_bounds(low)
     search.set_upper_bounds([max(pair) for pair in zip(low, high, strict=True)])
     search.set_ftol_rel(TOLERANCE)
-    search.set_maxeval(MOST_EVALUATIONS)
+    search.set_maxeval(MAX_EVALUATIONS)
     # A search that rounding stops, or that cannot go on, has been at the best that it found.
     with contextlib.suppress(nlopt.RoundoffLimited, nlopt.runtime_error):
         search.optimize(np.clip(start, low, high))

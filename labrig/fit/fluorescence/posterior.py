@@ -247,7 +247,7 @@ MUCH = 0.1
 #: Reduced χ² that is a fact to know: of few degrees of freedom it scatters.
 LARGE_CHI2 = 3.0
 #: Fraction of light that may come back, as `labrig.material.physical_warnings` has it.
-LARGEST_FRACTION, SIGMAS = 1.1, 3.0
+MAX_FRACTION, SIGMAS = 1.1, 3.0
 
 
 def fluorophores_of(
@@ -327,7 +327,7 @@ def facts_of(
     fractions = _total_fractions(matrix, surfaces)
     mean, sigma = fractions.mean(axis=0), fractions.std(axis=0, ddof=1)
     worst = int(np.argmax(mean - SIGMAS * sigma))
-    if mean[worst] > LARGEST_FRACTION + SIGMAS * sigma[worst]:
+    if mean[worst] > MAX_FRACTION + SIGMAS * sigma[worst]:
         facts.append(
             MoreThanWhite(float(matrix.input_nm[worst]), float(mean[worst]), float(sigma[worst]))
         )

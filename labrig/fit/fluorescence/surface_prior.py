@@ -143,7 +143,7 @@ LIBRARY_SHARE = 0.5
 #: Step in nm on which a shape is averaged in bands.
 STEP_NM = 1.0
 #: Least part of an emission of a library that must lie in the output bands.
-LEAST_INSIDE = 0.5
+MIN_INSIDE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +214,7 @@ def emission_shapes(output_nm: FloatArray, library: Sequence[Spectrum] = ()) -> 
         banded = emission.in_bands(edges)
         inside = float(banded @ np.diff(edges))
         whole = float(np.trapezoid(emission.value, emission.wavelength_nm))
-        if not (whole > 0 and inside >= LEAST_INSIDE * whole):
+        if not (whole > 0 and inside >= MIN_INSIDE * whole):
             raise UsageError(
                 f"emission '{emission.name}': expected positive light, most of it from "
                 f"{edges[0]:g} to {edges[-1]:g} nm, got {max(inside, 0.0):.3g} of {whole:.3g} "
@@ -237,7 +237,7 @@ def emission_shapes(output_nm: FloatArray, library: Sequence[Spectrum] = ()) -> 
 
 
 #: Variance of the excitation, relative to its largest, below which it is 0.
-LEAST_VARIANCE = 1e-3
+MIN_VARIANCE = 1e-3
 #: Added to prior covariances, relative to their largest variance.
 JITTER = 1e-6
 #: The same of a covariance of 0.
@@ -267,7 +267,7 @@ class Unknowns:
     def normal(cls, design: FloatArray, mean: float, covariance: FloatArray) -> Self:
         """Return the unknowns of a design (n, q) that vary enough, of covariance (q, q)."""
         variance = np.diag(covariance)
-        used = np.flatnonzero(variance > LEAST_VARIANCE * variance.max())
+        used = np.flatnonzero(variance > MIN_VARIANCE * variance.max())
         root = covariance_root(covariance[np.ix_(used, used)])
         inverse = np.asarray(np.linalg.inv(root).T)
         return cls(design[:, used], np.full(len(used), mean), inverse, used)

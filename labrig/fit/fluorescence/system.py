@@ -51,7 +51,7 @@ LOOSE = 1.0
 #: Fraction of a light's strongest input band from which another one counts as lit by it.
 LIT = 0.1
 #: Least part of a light's power that must lie within the input bands.
-LEAST_INSIDE = 0.9
+MIN_INSIDE = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -405,7 +405,7 @@ def fluorescence_system(
         )
     for exposure in exposures:
         inside = _power(exposure.light, (in_edges[0], in_edges[-1])) / _power(exposure.light)
-        if inside < LEAST_INSIDE:
+        if inside < MIN_INSIDE:
             raise UsageError(
                 f"light '{exposure.light.name}': expected its power from {in_edges[0]:g} to "
                 f"{in_edges[-1]:g} nm, got {inside:.0%} of it there; leave it out"

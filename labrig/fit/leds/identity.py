@@ -28,7 +28,7 @@ SHIFT_STEP_NM, WIDTH_STEP, SKEW_STEP = 0.5, 0.05, 0.05
 #: LEDs are not ten times as strong.
 DIM = 0.1
 #: Least part of the stronger LED's light that the weaker of two has.
-LEAST_PART = 0.05
+MIN_PART = 0.05
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ class _Matcher:
             normal = rows[:, 0] @ precision @ rows[:, 0].T
             weight = np.linalg.lstsq(normal, rows[:, 0] @ precision @ self._value, rcond=None)[0]
             weight = np.maximum(weight, 0.0)
-        if len(names) > 1 and weight.min() < LEAST_PART * weight.max():
+        if len(names) > 1 and weight.min() < MIN_PART * weight.max():
             return math.inf
         residual = self._value - weight @ rows[:, 0]
         return float(residual @ precision @ residual)

@@ -59,7 +59,7 @@ THIRD_ORDER_NM, EXACT_NM = 5.0, 0.01
 CENTRE_FLOOR_NM = 0.5
 #: Correlation length of errors of a gel's transmittance, which closer positions share.
 ALIKE_NM = 40.0
-FEWEST_FILTERS = 6
+MIN_FILTERS = 6
 #: Number of updates of the prior from the other positions, and steps in between.
 ROUNDS, STEPS = 4, 4
 
@@ -127,8 +127,8 @@ def calibrate_lvf(
             f"expected values of shape {shape} (positions, filters, channels), got "
             f"{values.shape} and σ of shape {sigmas.shape}"
         )
-    if len(filters) < FEWEST_FILTERS:
-        raise FitError(f"expected {FEWEST_FILTERS} or more filters, got {len(filters)}")
+    if len(filters) < MIN_FILTERS:
+        raise FitError(f"expected {MIN_FILTERS} or more filters, got {len(filters)}")
     centre_nm = wavelengths.wavelength_nm(positions)
     repetition = np.sqrt(max(1.0, ALIKE_NM / float(np.abs(np.diff(centre_nm)).mean())))
     problem = StripProblem(values, sigmas * repetition, filters, lamp, card, camera, curve_error)

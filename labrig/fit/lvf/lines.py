@@ -15,7 +15,7 @@ from labrig.foundation.errors import FitError
 from labrig.optics import NOMINAL_FWHM_NM, WavelengthMap, peak_shape
 from labrig.results import LocatedLines
 
-FEWEST_LINES = 3
+MIN_LINES = 3
 #: Smallest fraction of the profile's variance that lines and background must explain.
 MIN_EXPLAINED = 0.9
 #: Largest deviation, in σ, of a blend's fraction from its prior: an imperfect shape would bias it
@@ -103,9 +103,9 @@ class LineModel:
             clear = (heights > SIGNIFICANT * height_sigma).any(axis=1) & (at_sigma < LOCATED * fwhm)
             if clear.all():
                 break
-            if clear.sum() < FEWEST_LINES:
+            if clear.sum() < MIN_LINES:
                 raise FitError(
-                    f"no lines of mercury: {clear.sum()} could be located, {FEWEST_LINES} are "
+                    f"no lines of mercury: {clear.sum()} could be located, {MIN_LINES} are "
                     "needed; expose longer, or check the lamp"
                 )
             self.lines = [
@@ -359,7 +359,7 @@ def locate_lines(
     ]
     if not assignments:
         raise FitError(
-            f"no lines of mercury: of {len(peaks)} peaks no {FEWEST_LINES} stand like "
+            f"no lines of mercury: of {len(peaks)} peaks no {MIN_LINES} stand like "
             f"{', '.join(f'{line.centre_nm:.0f}' for line in lines)} nm; check that the mercury "
             "lamp is lit and the whole strip in the picture"
         )
@@ -424,7 +424,7 @@ def _assignments(
     """Return the peaks that agree best with each choice of lines."""
     centres = [line.centre_nm for line in lines]
     assignments: list[Assignment] = []
-    for number in range(min(len(lines), len(peaks)), FEWEST_LINES - 1, -1):
+    for number in range(min(len(lines), len(peaks)), MIN_LINES - 1, -1):
         for chosen in combinations(range(len(lines)), number):
             chosen_nm = [centres[k] for k in chosen]
             trials = [

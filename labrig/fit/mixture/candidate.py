@@ -18,9 +18,9 @@ from labrig.material import ReradiationMixture
 
 SEED = 2021
 #: Widest σ of an added component that is tried, and how often it is halved.
-WIDEST_SD_BANDS, HALVINGS = 4.0, 2
+MAX_SD_BANDS, HALVINGS = 4.0, 2
 #: Number of entries around which an added component is tried.
-MOST_CENTRES = 48
+MAX_CENTRES = 48
 
 
 def scattered_starts(
@@ -89,11 +89,11 @@ def with_one_more(
     residual = entries.wanted - model
     # Where most is missing, most can be gained.
     lacking = np.argsort(-np.where(entries.is_kept, residual, -np.inf), kind="stable")
-    centres = entries.points[:, lacking[: min(MOST_CENTRES, int(entries.is_kept.sum()))]]
+    centres = entries.points[:, lacking[: min(MAX_CENTRES, int(entries.is_kept.sum()))]]
     off = entries.points[:, np.newaxis] - centres[:, :, np.newaxis]
     distance2 = (off**2).sum(axis=0)
     best = (-np.inf, 0.0, 0, 0.0)
-    sd = WIDEST_SD_BANDS * entries.band_nm / entries.unit_nm
+    sd = MAX_SD_BANDS * entries.band_nm / entries.unit_nm
     shapes = np.exp(-0.5 * distance2 / sd**2)
     weight2 = (entries.weight / entries.weight.max()) ** 2
     for _ in range(HALVINGS + 1):
@@ -120,7 +120,7 @@ MAX_ITERATIONS = 100
 #: Gain in mean log-likelihood at which expectation maximisation ends.
 TOLERANCE = 1e-4
 #: Least σ of a component in bands: a narrower one could hide between their centres.
-LEAST_SD_BANDS = 0.5
+MIN_SD_BANDS = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,13 +186,13 @@ def candidates(
             masked_mse(entries, likely_mixture),
             likely.iterations,
             spent,
-            fit.ending is not Ending.CREEPING,
+            fit.ending is not Ending.SLOW_PROGRESS,
         )
         components += 1
 
 
 def _least_sd(entries: StokesEntries) -> float:
-    return LEAST_SD_BANDS * entries.band_nm / entries.unit_nm
+    return MIN_SD_BANDS * entries.band_nm / entries.unit_nm
 
 
 def _greedy(entries: StokesEntries, components: int, least_sd: float) -> tuple[Gaussians, float]:

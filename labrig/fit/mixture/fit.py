@@ -59,7 +59,7 @@ def _errors(
 
 
 #: Least part of the light, and least number of its σ, with which a column is compared.
-LEAST_PART, LEAST_SIGMAS = 0.01, 5.0
+MIN_PART, MIN_SIGMAS = 0.01, 5.0
 
 
 def light_sigma(matrix: ReradiationMatrix, entries: StokesEntries) -> float | None:
@@ -86,10 +86,10 @@ def light_kept(
     kept = _by_column(matrix, entries, modelled(entries, mixture))
     sigma = _column_sigma(matrix, entries)
     total = float(measured.sum())
-    bright = measured >= LEAST_PART * abs(total)
+    bright = measured >= MIN_PART * abs(total)
     off = np.abs(kept - measured)
     if sigma is not None:
-        bright &= measured >= LEAST_SIGMAS * sigma
+        bright &= measured >= MIN_SIGMAS * sigma
         off = off / np.where(sigma > 0, sigma, 1.0)
     else:
         off = off / np.where(bright, measured, 1.0)
@@ -129,7 +129,7 @@ def _column_sigma(matrix: ReradiationMatrix, entries: StokesEntries) -> FloatArr
 Selection = Literal["bic", "cross-validation"]
 
 #: Largest number of components that "auto" tries.
-MOST_COMPONENTS = 6
+MAX_COMPONENTS = 6
 #: Numbers of components in a row without a lower BIC after which "auto" ends.
 PATIENCE = 2
 
@@ -209,7 +209,7 @@ def fit_mixture(
     if not refine and (skewed or components == "auto"):
         raise UsageError("expected a number of normal components for a fit without refinement")
     if components == "auto":
-        most = max(min(MOST_COMPONENTS, kept // parameters), 1)
+        most = max(min(MAX_COMPONENTS, kept // parameters), 1)
         fits, table = _selected(entries, most, parameters, selection, skewed)
     elif 1 <= components <= most:
         fits = [

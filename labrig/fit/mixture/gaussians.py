@@ -18,7 +18,7 @@ AnyFloatArray = NDArray[Any]
 
 LOG_2PI = float(np.log(2 * np.pi))
 #: Weight below which a component is empty; its logarithm is still finite in single precision.
-LEAST_WEIGHT = 1e-12
+MIN_WEIGHT = 1e-12
 #: Multiplications of a matrix product up to which OpenBLAS takes one thread.
 ONE_THREAD = 2**18
 
@@ -44,7 +44,7 @@ class Gaussians:
     @classmethod
     def from_moments(cls, moments: AnyFloatArray, least_variance: float) -> "Gaussians":
         """Return those with the sums (B, K, 6) of the monomials, in no direction too narrow."""
-        weights = np.maximum(moments[..., 0], LEAST_WEIGHT)
+        weights = np.maximum(moments[..., 0], MIN_WEIGHT)
         first = moments[..., 1:3] / weights[..., np.newaxis]
         x, y = first[..., 0], first[..., 1]
         second = moments[..., 3:] / weights[..., np.newaxis]

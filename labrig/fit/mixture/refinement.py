@@ -7,7 +7,7 @@ its peak; the error that is reported, and seen, is the squared one.
 import numpy as np
 
 from labrig.fit.mixture.entries import StokesEntries
-from labrig.fit.mixture.gaussians import LEAST_WEIGHT, Gaussians
+from labrig.fit.mixture.gaussians import MIN_WEIGHT, Gaussians
 from labrig.fit.nonlinear_least_squares import LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 
@@ -17,10 +17,10 @@ from labrig.foundation.arrays import FloatArray
 PARAMETERS = 6
 #: Bounds in units of `StokesEntries.unit_nm`: a mean stays within the measured wavelengths, σ
 #: is no more than this, and the height no less than this times the largest entry.
-LARGEST_SD, LEAST_HEIGHT, STEEPEST = 20.0, 1e-6, 20.0
+MAX_SD, MIN_HEIGHT, STEEPEST = 20.0, 1e-6, 20.0
 #: Relative step at which a fit ends; gain, in parts of the squared light, at which one that is only
 #: compared ends.
-TOLERANCE, LEAST_GAIN = 1e-7, 1e-5
+TOLERANCE, MIN_GAIN = 1e-7, 1e-5
 MAX_ITERATIONS = 400
 
 
@@ -77,8 +77,8 @@ def refined(
     lower, upper = (
         np.tile([height, x_end, y_end, np.log(sd), slope, np.log(sd)], count)
         for height, x_end, y_end, sd, slope in (
-            (np.log(LEAST_HEIGHT), x.min(), y.min(), least_sd, -STEEPEST),
-            (np.inf, x.max(), y.max(), LARGEST_SD, STEEPEST),
+            (np.log(MIN_HEIGHT), x.min(), y.min(), least_sd, -STEEPEST),
+            (np.inf, x.max(), y.max(), MAX_SD, STEEPEST),
         )
     )
     fit = least_squares(
@@ -88,7 +88,7 @@ def refined(
         upper=upper,
         max_iterations=MAX_ITERATIONS,
         tolerance=TOLERANCE,
-        least_gain=0.0 if is_final else LEAST_GAIN * float(wanted @ wanted),
+        least_gain=0.0 if is_final else MIN_GAIN * float(wanted @ wanted),
     )
     return *_gaussians(fit.parameters, largest), fit
 
@@ -100,7 +100,7 @@ def _parameters(start: Gaussians, scale: float) -> FloatArray:
     height = scale * start.weights[0] / (2 * np.pi * np.sqrt(variance_x * remaining))
     mean = start.mean[0]
     columns = [
-        np.log(np.maximum(height, LEAST_WEIGHT)),
+        np.log(np.maximum(height, MIN_WEIGHT)),
         mean[:, 0],
         mean[:, 1],
         0.5 * np.log(variance_x),
@@ -129,7 +129,7 @@ def _gaussians(parameters: FloatArray, largest: float) -> tuple[Gaussians, float
 SKEWED_PARAMETERS = 8
 
 #: Bounds: one side nine times as wide as the other, and no ridge narrower than the bands.
-LARGEST_SKEW, LARGEST_CORRELATION = np.log(3.0), 0.95
+MAX_SKEW, MAX_CORRELATION = np.log(3.0), 0.95
 
 #: Skews are little determined: their valleys are flat.
 MAX_SKEWED_ITERATIONS = 1000
@@ -183,12 +183,12 @@ def refined_skewed(
         return value.sum(axis=0) - wanted, jacobian.reshape(-1, len(x)).T
 
     count = start.weights.shape[-1]
-    slant = np.arctanh(LARGEST_CORRELATION)
+    slant = np.arctanh(MAX_CORRELATION)
     lower, upper = (
         np.tile([height, x_end, np.log(sd), skew, y_end, np.log(sd), skew, steepest], count)
         for height, x_end, y_end, sd, skew, steepest in (
-            (np.log(LEAST_HEIGHT), x.min(), y.min(), least_sd, -LARGEST_SKEW, -slant),
-            (np.inf, x.max(), y.max(), LARGEST_SD, LARGEST_SKEW, slant),
+            (np.log(MIN_HEIGHT), x.min(), y.min(), least_sd, -MAX_SKEW, -slant),
+            (np.inf, x.max(), y.max(), MAX_SD, MAX_SKEW, slant),
         )
     )
     fit = least_squares(
@@ -198,7 +198,7 @@ def refined_skewed(
         upper=upper,
         max_iterations=MAX_SKEWED_ITERATIONS,
         tolerance=TOLERANCE,
-        least_gain=0.0 if is_final else LEAST_GAIN * float(wanted @ wanted),
+        least_gain=0.0 if is_final else MIN_GAIN * float(wanted @ wanted),
     )
     return *_skewed_mixture(fit.parameters, largest), fit
 
@@ -232,11 +232,11 @@ def _axis(
 def _skewed_parameters(start: Gaussians, scale: float) -> FloatArray:
     variance_x, covariance, variance_y = np.moveaxis(start.covariance[0], -1, 0)
     sd_x, sd_y = np.sqrt(variance_x), np.sqrt(variance_y)
-    rho = np.clip(covariance / (sd_x * sd_y), -LARGEST_CORRELATION, LARGEST_CORRELATION)
+    rho = np.clip(covariance / (sd_x * sd_y), -MAX_CORRELATION, MAX_CORRELATION)
     height = scale * start.weights[0] / (2 * np.pi * sd_x * sd_y * np.sqrt(1 - rho * rho))
     mean, no_skew = start.mean[0], np.zeros_like(rho)
     columns = [
-        np.log(np.maximum(height, LEAST_HEIGHT)),
+        np.log(np.maximum(height, MIN_HEIGHT)),
         mean[:, 0],
         np.log(sd_x),
         no_skew,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from labrig.fit.mixture.candidate import LEAST_SD_BANDS
+from labrig.fit.mixture.candidate import MIN_SD_BANDS
 from labrig.fit.mixture.gaussians import (
     AnyFloatArray,
     Gaussians,
@@ -176,7 +176,7 @@ class _Grid:
             matrix.output_width_nm[row].astype(np.float32),
             monomials_of(x[column], y[row]).astype(np.float32),
             origin_nm,
-            float(LEAST_SD_BANDS * band_nm / UNIT_NM) ** 2,
+            float(MIN_SD_BANDS * band_nm / UNIT_NM) ** 2,
         )
 
 

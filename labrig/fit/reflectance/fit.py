@@ -36,7 +36,7 @@ STIFFEST = 1e5
 #: the albedo there, over two times 10 nm.
 UNRESOLVED, UNRESOLVED_NM = 0.1, 10.0
 #: Of that part, where sample and card are alike and nothing tells it.
-LEAST_PRECISION = 1.0
+MIN_PRECISION = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -427,7 +427,7 @@ def _thrown_back(white: LitStrip, narrow: LitStrip, card: Transmittance) -> tupl
     scale_sigma = float(np.hypot(white.scale_sigma, narrow.scale_sigma))
     slopes = np.column_stack([onto, expected])
     weighted = np.linalg.solve(spread, slopes)
-    precision = slopes.T @ weighted + np.diag([LEAST_PRECISION, scale_sigma**-2])
+    precision = slopes.T @ weighted + np.diag([MIN_PRECISION, scale_sigma**-2])
     covariance = np.linalg.inv(precision)
     part, _ = covariance @ weighted.T @ (value - expected)
     return float(part), float(np.sqrt(covariance[0, 0]))

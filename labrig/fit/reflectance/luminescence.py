@@ -32,9 +32,9 @@ STOKES_SIGMA = 0.3
 #: emission.
 COLOUR_SIGMA = 0.2
 #: Least part of the emission beyond a place's wavelength that counts in the prior.
-LEAST_BEYOND = 1e-4
+MIN_BEYOND = 1e-4
 #: Least part of the emission at longer wavelengths than a place's that tells its colour there.
-LEAST_SIDE = 0.02
+MIN_SIDE = 0.02
 #: Reach of the emission's change of colour, in its widths.
 REDDEST = 2.5
 
@@ -127,7 +127,7 @@ class Luminescence:
         places = len(amounts)
         away_nm = self.centre_nm - self.centre_nm[:, np.newaxis]
         # Light as red as the emission excites as much less as there is less beyond it.
-        sigma = LARGEST * mean * np.sqrt(np.maximum(self.beyond, LEAST_BEYOND))
+        sigma = LARGEST * mean * np.sqrt(np.maximum(self.beyond, MIN_BEYOND))
         redder = STOKES_SIGMA * np.maximum(amounts, 0.0)
         covariance = np.zeros((2 * places + 2, 2 * places + 2))
         covariance[:places, :places] = np.outer(sigma, sigma) * _alike(away_nm, ALIKE_NM)
@@ -197,7 +197,7 @@ def luminescence_by_glow(
     slope = np.clip((white_nm - mean_nm) / width_nm, -REDDEST, REDDEST)[:, np.newaxis]
     is_beyond = white_nm > narrow_nm[:, np.newaxis]
     beyond = is_beyond @ by_place / whole
-    is_within = beyond > LEAST_SIDE
+    is_within = beyond > MIN_SIDE
     more = np.where(is_within, 1 / np.where(is_within, beyond, 1.0), 0.0)[:, np.newaxis]
     added = is_beyond * more - is_within[:, np.newaxis]
     redder = added[:, :, np.newaxis] * glow

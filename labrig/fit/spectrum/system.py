@@ -187,7 +187,7 @@ def _filter_changes(lvf: Lvf, nodes: FloatArray) -> Iterator[tuple[int, FloatArr
             yield position, change[position]
 
 
-FEWEST_VALUES = 3
+MIN_VALUES = 3
 
 
 def measured(
@@ -204,9 +204,9 @@ def measured(
     used = np.isfinite(values) & np.isfinite(sigmas) & system.design.any(axis=1)
     if (sigmas[used] <= 0).any():
         raise FitError("expected every σ above 0, got some of 0; give the noise of every value")
-    if used.sum() < FEWEST_VALUES:
+    if used.sum() < MIN_VALUES:
         raise FitError(
-            f"expected {FEWEST_VALUES} or more values that are neither clipped nor missing, got "
+            f"expected {MIN_VALUES} or more values that are neither clipped nor missing, got "
             f"{used.sum()}; expose shorter or light more of the filter"
         )
     part = system.of(used)

@@ -8,7 +8,7 @@ from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Radiance factors at 45°/0° are no energies: of 97 measured surfaces the brightest has 1.07.
 UNUSUAL_FRACTION = 1.0
-LARGEST_FRACTION = 1.1
+MAX_FRACTION = 1.1
 #: Dark samples are found negative when the dark reading drifts.
 LOWEST_REFLECTANCE = -0.02
 SIGMAS = 3.0
@@ -49,9 +49,9 @@ def physical_warnings(matrix: ReradiationMatrix) -> tuple[str, ...]:
         return ()
     fraction, sigma = matrix.total_fraction, _total_sigma(matrix)
     worst = int(np.argmax(fraction - SIGMAS * sigma))
-    if fraction[worst] > LARGEST_FRACTION + SIGMAS * sigma[worst]:
+    if fraction[worst] > MAX_FRACTION + SIGMAS * sigma[worst]:
         raise DataError(
-            f"expected at most {LARGEST_FRACTION:g} + 3 σ of the light at "
+            f"expected at most {MAX_FRACTION:g} + 3 σ of the light at "
             f"{matrix.input_nm[worst]:g} nm to come back from {matrix.name!r}, got "
             f"{fraction[worst]:.3f} ± {sigma[worst]:.3f}: look for a wrong scale or unit, such as "
             "percent"

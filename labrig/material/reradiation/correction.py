@@ -29,7 +29,7 @@ from labrig.material.reradiation.noise import (
 )
 
 #: Anti-Stokes entries from which an offset is known well enough.
-FEWEST_ENTRIES = 3
+MIN_ENTRIES = 3
 #: Entries' worth of doubt about an offset, which draws that of short columns towards 0.
 DOUBT_ENTRIES = 1.0
 #: σ after over σ before. What is left drifts along the column: 0.7 of σ on the anti-Stokes side
@@ -76,11 +76,11 @@ def without_offset(matrix: ReradiationMatrix) -> ReradiationMatrix:
     used = clear_anti_stokes(matrix) & (sigma > 0)
     counts = used.sum(axis=0)
     pulls = np.divide(matrix.reradiation, sigma, out=np.zeros_like(sigma), where=used)
-    offset = np.where(counts < FEWEST_ENTRIES, 0.0, pulls.sum(axis=0) / (counts + DOUBT_ENTRIES))
-    left = np.where(counts < FEWEST_ENTRIES, 1.0, LEFT_SIGMA)
+    offset = np.where(counts < MIN_ENTRIES, 0.0, pulls.sum(axis=0) / (counts + DOUBT_ENTRIES))
+    left = np.where(counts < MIN_ENTRIES, 1.0, LEFT_SIGMA)
     before = matrix.column_correlation
     correlation = np.where(
-        counts < FEWEST_ENTRIES, 0.0 if before is None else before, LEFT_CORRELATION
+        counts < MIN_ENTRIES, 0.0 if before is None else before, LEFT_CORRELATION
     )
     return replace(
         matrix,
@@ -98,7 +98,7 @@ CORRECTION_SCATTER = 0.2
 #: The same at the last output band, where the instrument's scan ends: 780 nm has 1.8 times as much.
 END_SCATTER = 0.8
 #: Bands beside one another for which two numbers are fitted.
-FEWEST_PAIRS = 8
+MIN_PAIRS = 8
 #: Residuals beyond this many of their σ have less weight in the fit (P. J. Huber, 1964).
 HUBER_SIGMAS = 1.345
 TINY = np.finfo(float).tiny
@@ -138,7 +138,7 @@ def without_spill(matrix: ReradiationMatrix) -> ReradiationMatrix:
     low, high = matrix.reflectance[lower], matrix.reflectance[upper]
     terms = np.stack([high - low, (high + low) / 2], axis=1)
     known = np.isfinite(terms).all(axis=1) & np.isfinite(below)
-    if known.sum() < FEWEST_PAIRS:
+    if known.sum() < MIN_PAIRS:
         return matrix
     lower, upper, column, terms = lower[known], upper[known], column[known], terms[known]
     spill = terms @ (ABOVE_TO_BELOW * _robust_fit(terms, below[known]))

@@ -16,7 +16,7 @@ from labrig.material.reradiation.matrix import ReradiationMatrix
 from labrig.material.reradiation.mixture import ReradiationMixture
 
 #: Most bands of the incident light: a step of 1 nm over all that instruments measure.
-MOST_BANDS = 5000
+MAX_BANDS = 5000
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +132,8 @@ def _stored(content: dict[str, Any]) -> StoredMixture:
     low, high = (float(end) for end in content["measured_input_nm"])
     if not (0 < band_nm < math.inf and 0 < low < high < math.inf):
         raise ValueError("bands above 0 nm are needed")
-    if (high - low) / band_nm > MOST_BANDS:
-        raise ValueError(f"more than {MOST_BANDS} bands")
+    if (high - low) / band_nm > MAX_BANDS:
+        raise ValueError(f"more than {MAX_BANDS} bands")
     parts = content["components"]
     skews = [part["skew"] for part in parts if "skew" in part]
     mixture = ReradiationMixture(

@@ -241,9 +241,9 @@ T = TypeVar("T")
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
 #: Rows without data of their own, which a damaged file states for nothing.
-MOST_ZEROS = 10**7
+MAX_ZEROS = 10**7
 #: Longest name of a file.
-MOST_LETTERS = 1000
+MAX_LETTERS = 1000
 #: Part of the largest number by which others may differ from the least and largest stated: files
 #: have these with few digits.
 STATED_DIGITS = 1e-4
@@ -317,7 +317,7 @@ class GltfNumbers:
             stored = self._rows(accessor.buffer_view, accessor.byte_offset, component, shape)
         elif accessor.sparse is None:
             raise UsageError(f"accessor {number}: expected a buffer view, got none")
-        elif accessor.count > MOST_ZEROS:
+        elif accessor.count > MAX_ZEROS:
             raise UsageError(f"accessor {number}: expected fewer rows, got {accessor.count}")
         else:
             stored = np.zeros((accessor.count, width), component)
@@ -378,7 +378,7 @@ class GltfNumbers:
         else:
             name = unquote(uri)
             path = self._folder / name
-            if len(name) > MOST_LETTERS or "\0" in name or not path.is_file():
+            if len(name) > MAX_LETTERS or "\0" in name or not path.is_file():
                 raise UsageError(f"buffer {number}: expected a file {name[:60]!r}, got none")
             content = read_bytes(path, MAX_MESH_BYTES)
         if len(content) < buffer.byte_length:

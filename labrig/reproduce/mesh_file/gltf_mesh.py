@@ -41,7 +41,7 @@ OF_MATERIALS = "KHR_materials_"
 OF_NODES = ("EXT_mesh_gpu_instancing", "KHR_node_visibility")
 MOVING = "expected a shape at rest, got {}; bake it into its vertices at one moment"
 #: Vertices and corners of triangles in all places of a scene; a gigabyte of memory holds as many.
-MOST_CORNERS = 20_000_000
+MAX_CORNERS = 20_000_000
 
 
 def gltf_mesh(content: bytes, folder: Path) -> Mesh:
@@ -107,9 +107,9 @@ def _hold_to_budget(primitives: Sequence[Primitive], document: GltfDocument) -> 
         for number in (primitive.attributes.get("POSITION"), primitive.indices)
         if number is not None
     ]
-    if sum(counts) > MOST_CORNERS:
+    if sum(counts) > MAX_CORNERS:
         raise UsageError(
-            f"expected at most {MOST_CORNERS} vertices and corners in all places of its meshes, "
+            f"expected at most {MAX_CORNERS} vertices and corners in all places of its meshes, "
             f"got {sum(counts)}"
         )
 

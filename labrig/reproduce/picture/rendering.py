@@ -111,7 +111,7 @@ Record = Callable[[float, FloatArray], None]
 #: First step after a change of light, as a part of the fastest relaxation; later ones grow.
 FIRST_STEP, GROWTH = 0.25, 2.0
 #: Change of the logarithm of all light at which steps grow no more; rounds and parts of a step.
-MOST_CHANGE, ROUNDS, PARTS = 0.7, 2, 8
+MAX_CHANGE, ROUNDS, PARTS = 0.7, 2, 8
 #: Relative change of light within a step that is none.
 UNCHANGED = 1e-5
 #: Rounds in which levels of a long charge settle, and their last change.
@@ -120,9 +120,9 @@ CHARGING_ROUNDS, SETTLED = 100, 1e-5
 PROMPT_ROUNDS = 6
 TINY = 1e-300
 #: Part of the rays that may leave a closed room between its triangles: none do of a whole mesh.
-MOST_ESCAPED = 1e-4
+MAX_ESCAPED = 1e-4
 #: Steps of a scene that moves.
-MOST_STEPS = 100_000
+MAX_STEPS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ class Frame:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong with the picture, one sentence each."""
-        if self.escaped_share <= MOST_ESCAPED:
+        if self.escaped_share <= MAX_ESCAPED:
             return ()
         return (
             f"{self.escaped_share:.2%} of the rays left the closed room between its triangles and "
@@ -527,7 +527,7 @@ class Renderer:
                 record(t_s, np.mean(middles, axis=0))
             t_s = end_s if step_s == end_s - t_s else t_s + step_s
             change = abs(math.log(max(float(later.sum()), TINY) / max(float(light.sum()), TINY)))
-            step_s *= min(GROWTH, MOST_CHANGE / max(change, TINY))
+            step_s *= min(GROWTH, MAX_CHANGE / max(change, TINY))
             light, n_steps = later, n_steps + 1
             self._report(_levels_until(end_s), n_steps / (n_steps + (end_s - t_s) / step_s))
 
@@ -540,9 +540,9 @@ class Renderer:
         """Step through a time in which something moves, which is where it is in mid-step."""
         longest = self._scene.file.step_s or math.inf
         parts = max(1, math.ceil((end_s - begin_s) / longest - 1e-9))
-        if parts > MOST_STEPS:
+        if parts > MAX_STEPS:
             raise UsageError(
-                f"{self._scene.file.name}: expected at most {MOST_STEPS} steps between two "
+                f"{self._scene.file.name}: expected at most {MAX_STEPS} steps between two "
                 f"pictures, got {parts:g}; give a longer 'step_s'"
             )
         edges = np.linspace(begin_s, end_s, parts + 1).tolist()

@@ -21,7 +21,7 @@ from labrig.reproduce.transport.lamp import LampTable
 from labrig.reproduce.transport.tracing import Paths, Tracer
 
 #: Part of the memory that paths and pictures may take, and copies of a picture at once.
-LARGEST_PART, MOST_COPIES = 0.7, 6
+MAX_PART, MAX_COPIES = 0.7, 6
 #: Memory in bytes that tells where a texel lies on its surface.
 OF_TEXEL = 300
 
@@ -200,15 +200,15 @@ def require_memory(scene: Scene) -> None:
     )
     n_paths = camera.width_px * camera.height_px * paths.per_pixel + places * paths.per_place
     needed = scene.path_length.nbytes(n_paths, len(scene.file.lamps))
-    needed += MOST_COPIES * 4 * len(scene.bands) * (places + camera.width_px * camera.height_px)
+    needed += MAX_COPIES * 4 * len(scene.bands) * (places + camera.width_px * camera.height_px)
     needed += OF_TEXEL * places
     for material in scene.materials:
         if material.texture is not None and material.parameters is not None:
             states = material.parameters.n_states
             needed += 4 * states * (1 + 2 * len(scene.bands)) * places
-    if needed > LARGEST_PART * there:
+    if needed > MAX_PART * there:
         raise UsageError(
-            f"{scene.file.name}: expected paths that fit into {LARGEST_PART * there / 1e9:.1f} GB, "
+            f"{scene.file.name}: expected paths that fit into {MAX_PART * there / 1e9:.1f} GB, "
             f"of {there / 1e9:.1f} GB of memory, got {needed / 1e9:.1f} GB; take fewer paths "
             "(--paths), a smaller picture (--size) or fewer texels"
         )

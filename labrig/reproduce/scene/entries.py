@@ -293,8 +293,8 @@ class ObjectEntry(ScenePart):
                 raise ValueError(f"expected one of {', '.join(names)}, got {got}")
         if self.particles is not None and (self.samples or self.material is None):
             raise ValueError("expected 'particles' of one 'material' and without 'samples'")
-        if self.wave is not None and (self.rectangle is None or self.rectangle.parts < LEAST_PARTS):
-            raise ValueError(f"expected 'wave' with a rectangle of {LEAST_PARTS} 'parts' or more")
+        if self.wave is not None and (self.rectangle is None or self.rectangle.parts < MIN_PARTS):
+            raise ValueError(f"expected 'wave' with a rectangle of {MIN_PARTS} 'parts' or more")
         if self.lamp is not None and self.two_sided:
             raise ValueError("expected a lamp without 'two_sided': it shines from its front")
         if self.wave is not None and self.vertices_over_time is not None:
@@ -303,5 +303,5 @@ class ObjectEntry(ScenePart):
 
 
 #: Parts of a rectangle of which a wave can be seen.
-LEAST_PARTS = 8
+MIN_PARTS = 8
 SHAPES = ("rectangle", "disk", "box", "sphere", "mesh", "particles")

@@ -17,7 +17,7 @@ from labrig.reproduce.transport.geometry import Samples, Surface
 from labrig.reproduce.transport.mesh import Mesh, rotation
 
 #: Patches of one body that are looked at, the largest ones.
-MOST_PATCHES = 100
+MAX_PATCHES = 100
 
 
 def placed_mesh(name: str, entry: ObjectEntry, shape: MeshEntry, folder: Path) -> Mesh:
@@ -88,7 +88,7 @@ def _is_seen_from_front(mesh: Mesh, inward: bool) -> bool:
     patches = []
     for body in bodies:
         by_area = sorted(body.pieces(most_at_edge=2), key=lambda patch: -patch.area_m2)
-        patches += by_area[:MOST_PATCHES]
+        patches += by_area[:MAX_PATCHES]
     air = -1 if inward else 0
     in_front = [bodies_at(_point_in_front(patch)) for patch in patches if patch.area_m2 > 0]
     least = min(in_front, default=air)
@@ -104,7 +104,7 @@ def _point_in_front(mesh: Mesh) -> FloatArray:
 
 #: Texels of a phosphor where nobody says otherwise; the sides of a box lie three by two.
 TEXELS, TEXELS_OF_BOX = (64, 64), (96, 64)
-MOST_AREA_M2 = 1e12
+MAX_AREA_M2 = 1e12
 
 
 def surface_over_time(
@@ -117,7 +117,7 @@ def surface_over_time(
 ) -> Callable[[float], Surface]:
     """Return a function that gives an object at a time in s."""
     mesh = _mesh(name, entry, folder)
-    if not 0 < mesh.area_m2 < MOST_AREA_M2:
+    if not 0 < mesh.area_m2 < MAX_AREA_M2:
         raise UsageError(f"{name}: expected a surface with an area, got {mesh.area_m2:g} m²")
     lamp = -1 if entry.lamp is None else lamps[entry.lamp]
     used = [numbers[entry.material]] if entry.material is not None else []

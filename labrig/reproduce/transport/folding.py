@@ -143,7 +143,7 @@ def fold(
 
 
 #: Sequences of coloured materials that are told apart.
-MOST_SEQUENCES = 30_000
+MAX_SEQUENCES = 30_000
 #: Relative difference of the albedo of two bands that is no colour.
 GREY = 1e-6
 
@@ -185,7 +185,7 @@ class Sequences:
         """
         grey, number = greys(materials)
         kernel = compiled("transport.folding_kernels").sequences
-        child = np.full((MOST_SEQUENCES, int(number.max()) + 1), -1, np.int32)
+        child = np.full((MAX_SEQUENCES, int(number.max()) + 1), -1, np.int32)
         found, carried, count = [], [], 1
         for own in paths:
             found.append(np.zeros(len(own.place), np.int32))

@@ -20,7 +20,7 @@ from labrig.reproduce.transport.mesh import Mesh
 
 #: Points along each edge of a texel at which its place on the surface is looked up, at least; and
 #: along each edge of the texture.
-LEAST_LOOKUPS, LEAST_POINTS = 4, 256
+MIN_LOOKUPS, MIN_POINTS = 4, 256
 #: Part of the looked-up points that may belong to two triangles: rounding along their edges.
 SHARED_POINTS = 0.02
 #: Decimals of texture coordinates, and of places relative to the mesh, at which vertices are one.
@@ -74,7 +74,7 @@ class TexelMap:
         """
         columns, rows = samples
         corners = texture_coordinates(name, mesh)[mesh.faces].astype(np.float32)
-        across, up = (max(LEAST_LOOKUPS, math.ceil(LEAST_POINTS / size)) for size in samples)
+        across, up = (max(MIN_LOOKUPS, math.ceil(MIN_POINTS / size)) for size in samples)
         face_at, n_shared = compiled("transport.tracing_kernels").rasterised(
             corners, columns * across, rows * up
         )

@@ -25,7 +25,7 @@ _HOUR_S, _HALF_DAY_S, _DAY_S = 3600, 43200, 86400
 #: Rows before and after a jump whose spacing proves it, and the fewest of them.
 _NEIGHBOURS, _FEWEST = 10, 4
 #: Longest row spacing from which a jump of an hour stands out.
-_LONGEST_SPACING_S = 3600
+_MAX_SPACING_S = 3600
 #: Largest spacing over the smallest one of regular rows.
 _REGULAR_SHARE = 3.0
 
@@ -36,7 +36,7 @@ _CHANGE_MONTHS = frozenset({2, 3, 4, 9, 10, 11})
 
 _SUNDAY = 6
 #: More jumps ahead by an hour than this are the pauses of a schedule.
-_MOST_JUMPS = 2
+_MAX_JUMPS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ def _without_summer_time(clock: Clock) -> Clock:
                 f"{from_to}, by an hour as at the begin of summer time: the spacing of the rows "
                 "shows it, and an hour was taken off from there on"
             )
-        elif row in ahead and len(ahead) <= _MOST_JUMPS:
+        elif row in ahead and len(ahead) <= _MAX_JUMPS:
             warnings.append(
                 f"{from_to}, by just an hour more than the rows around it: it is taken for a "
                 "pause; if the clock was set, take the hour off the times that follow"
@@ -176,7 +176,7 @@ def _steps(ticks: Sequence[int]) -> list[int]:
 def _is_regular(clock: Clock, steps: Sequence[int], row: int, step: int) -> bool:
     """Return whether `step` is like the steps around row `row`, which are regular."""
     near = [*steps[max(row - _NEIGHBOURS, 0) : row], *steps[row + 1 : row + 1 + _NEIGHBOURS]]
-    longest = _LONGEST_SPACING_S * clock.per_s
+    longest = _MAX_SPACING_S * clock.per_s
     near = [other for other in near if 0 <= other <= longest]
     if len(near) < _FEWEST:
         return False
@@ -379,7 +379,7 @@ _SAID = {
 #: and month the longest one is more by this factor.
 _REGULAR = 10.0
 #: Fewest row spacings that tell whether rows are regular.
-_FEWEST_SPACINGS = 3
+_MIN_SPACINGS = 3
 #: Forms of clocks in headers and in the option `--time-unit`.
 _HOURS_MINUTES = re.compile(r"\bh+:m|uhrzeit|clock|time of day|heure|\blocal|\butc|\bh(ours)?\b")
 _MINUTES_SECONDS = re.compile(r"(?<!:)\bm+(in)?:s|\bmin(utes)?\b")
@@ -697,7 +697,7 @@ def _likely(
     ratio = {}
     for order in orders:
         sizes = [abs(step) for step in steps_s[order] if step]
-        enough = len(sizes) >= _FEWEST_SPACINGS
+        enough = len(sizes) >= _MIN_SPACINGS
         ratio[order] = max(sizes) / median(sizes) if enough else _REGULAR
     best = min(orders, key=lambda order: ratio[order])
     others = [ratio[order] for order in orders if order != best]

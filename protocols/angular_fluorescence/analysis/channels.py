@@ -10,7 +10,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 
 #: Largest fraction of reflected light in a channel that is chosen.
-LARGEST_REFLECTED = 0.05
+MAX_REFLECTED = 0.05
 #: Response to an LED over that at a channel's peak below which a camera does not see the LED.
 _INVISIBLE = 1e-3
 #: Part of its light in the channel that sees an LED best which is reflected, and its σ: the rest
@@ -88,7 +88,7 @@ def chosen_channels(
             "expected 'channels' in the protocol, for example [R], or centre and fwhm of the LED "
             "and the camera's curves in the rig file, from which they follow"
         )
-    return [n for n, limit in enumerate(limits) if limit <= LARGEST_REFLECTED] or [
+    return [n for n, limit in enumerate(limits) if limit <= MAX_REFLECTED] or [
         int(np.argmin(limits))
     ]
 

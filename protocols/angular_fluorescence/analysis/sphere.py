@@ -31,14 +31,14 @@ from labrig.results import LEVEL
 _BLUR = 1.0
 #: Blur in cells of an edge by the cells themselves and the interpolation between them; the lens
 #: adds to it, up to this many times as much.
-_CELL_BLUR, _MOST_BLUR = 0.5, 6.0
+_CELL_BLUR, _MAX_BLUR = 0.5, 6.0
 #: Fraction of the brightest light above which a cell counts as lit.
 _LIT = 0.25
 #: Directions about the light's side in which the outline is looked for, in degrees.
 _REACH_DEG = 65.0
 _RAYS = 61
 #: Least number of them in which it must be seen, and number of sectors of the jackknife.
-_LEAST_RAYS, _SECTORS = 20, 6
+_MIN_RAYS, _SECTORS = 20, 6
 #: Step along a ray in cells, and cells beyond the outline that must be in the picture.
 _STEP, _MARGIN = 0.25, 3.0
 #: Least part of the light that is lost there within these cells on both sides.
@@ -120,7 +120,7 @@ def find_outline(picture: FloatArray, side_deg: float) -> Outline:
 
 def _require_arc(rays: int) -> None:
     """Refuse an outline of which too little is in the picture."""
-    if rays < _LEAST_RAYS:
+    if rays < _MIN_RAYS:
         raise DataError(
             f"expected the outline of the sphere in the region on the side of the light, got it in "
             f"{rays} of {_RAYS} directions: the region cuts it off; enlarge the region, or give "
@@ -214,7 +214,7 @@ def _fitted(
     found = optimize.least_squares(
         residual,
         (*first, 1.5),
-        bounds=([-np.inf, -np.inf, 0.0, 1.0], [np.inf, np.inf, np.inf, _MOST_BLUR]),
+        bounds=([-np.inf, -np.inf, 0.0, 1.0], [np.inf, np.inf, np.inf, _MAX_BLUR]),
         diff_step=np.full(4, 1e-3),
         loss="soft_l1",
         f_scale=0.05,
@@ -248,7 +248,7 @@ def _rim(inwards: FloatArray, radius: float, blur: float) -> FloatArray:
 #: Blocks of cells across a sphere, of which each is one place.
 BLOCKS_ACROSS = 40
 #: Least mean light as a fraction of the sensor's range: below, no LED was lit.
-LEAST_LIGHT = 1e-3
+MIN_LIGHT = 1e-3
 #: Directions of the light's sides in degrees from the right, downwards.
 SIDES_DEG = {"right": 0.0, "below": 90.0, "left": 180.0, "above": 270.0}
 #: Tangent of the field angle in the corners of a 50 mm lens on a full-format body: what an
@@ -337,7 +337,7 @@ def _view(
     if any(saturated_cells(read_raw(frame.path))[window].any() for frame in on):
         return None, "it clips (lower camera.iso)"
     light = _mean(on, window) - _mean(off, window)
-    if np.percentile(light.sum(axis=2), 99) < LEAST_LIGHT:
+    if np.percentile(light.sum(axis=2), 99) < MIN_LIGHT:
         return None, "dark: the LED did not light, or the sphere was not in the region"
     corner = left * cell, top * cell
     return View(pose, raw.channels, light, corner, cell, (raw.width, raw.height)), ""

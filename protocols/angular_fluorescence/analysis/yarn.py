@@ -25,9 +25,9 @@ from labrig.reduce import reduce_series
 from labrig.results import LEVEL, Series, is_usable
 
 #: Least signal of a view over the median of all of them: another LED was lit, or none.
-LEAST_SIGNAL = 0.2
+MIN_SIGNAL = 0.2
 #: Least signal over its σ.
-LEAST_SIGMAS = 5.0
+MIN_SIGMAS = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def _lit(views: Sequence[View]) -> tuple[list[View], list[str]]:
         return [], []
     total = np.array([view.value.sum() for view in views])
     sigma = np.array([np.sqrt((view.sigma**2).sum()) for view in views])
-    is_lit = (total > LEAST_SIGMAS * sigma) & (total > LEAST_SIGNAL * np.median(total))
+    is_lit = (total > MIN_SIGMAS * sigma) & (total > MIN_SIGNAL * np.median(total))
     dark = [view.pose.unit for view, lit in zip(views, is_lit, strict=True) if not lit]
     if not dark:
         return list(views), []

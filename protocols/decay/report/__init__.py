@@ -183,7 +183,7 @@ def steady(series: Series) -> SteadySource | None:
 
 #: Largest number of patches that are shown in full; of more, the page shows an overview, and each
 #: is folded up until a reader opens it.
-MOST_UNFOLDED = 4
+MAX_UNFOLDED = 4
 #: Largest number of patches whose names are shown on photographs; of more, numbers are shown.
 NAMES_ON_PHOTOGRAPH = 3
 #: Positions of the shown photographs of the glow, as fractions of the first decay's frames; dense
@@ -267,7 +267,7 @@ class _Content:
     @property
     def is_folded(self) -> bool:
         """Whether patches are folded up until a reader opens them."""
-        return len(self.patches) > MOST_UNFOLDED
+        return len(self.patches) > MAX_UNFOLDED
 
 
 def render(result: DecayResult, source: Source) -> Rendered:

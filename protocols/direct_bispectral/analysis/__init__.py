@@ -17,7 +17,7 @@ from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import card_reflectance, filter_transmittances
 from labrig.fit.bispectral import (
     BispectralColumns as BispectralColumns,
-    LitSpectrum,
+    IlluminatedSpectrum,
     band_weights_nm,
     bispectral_columns,
     light_window_nm,
@@ -131,7 +131,7 @@ class _Lit:
     Of the white reference also the range in nm within which the light's power is counted.
     """
 
-    spectrum: LitSpectrum
+    spectrum: IlluminatedSpectrum
     integration_s: float
     window_nm: tuple[float, float] = (0.0, 0.0)
 
@@ -296,7 +296,7 @@ def _left_line(stage: str, parts: Mapping[str, float]) -> str:
 
 def _lit_spectrum(
     reading: SpectrometerReading, dark: SpectrometerReading, noise: ReadingNoise
-) -> LitSpectrum:
+) -> IlluminatedSpectrum:
     """Return a reading above the dark in the scale of the spectrometer, with its σ."""
     if reading.calibration is None:
         raise DataError(
@@ -320,7 +320,7 @@ def _lit_spectrum(
     known[list(reading.dark_pixels)] = False
     wavelength_nm = measured.wavelength_nm[known]
     factor = calibration.at(wavelength_nm) / time_s
-    return LitSpectrum(
+    return IlluminatedSpectrum(
         wavelength_nm,
         factor * measured.counts[known],
         factor * np.sqrt(variance[known]),

@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.bispectral import BispectralColumns, LitSpectrum
+from labrig.fit.bispectral import BispectralColumns, IlluminatedSpectrum
 from labrig.optics import SpectrometerReading
 
 #: Ends of the range within which a light's power is counted, in nm.
@@ -36,7 +36,7 @@ TOLD_AMBIENT_PER_S = 2.0
 TOLD_LEFT = 2e-3
 
 
-def second_peak(name: str, light: LitSpectrum, window_nm: Window) -> str | None:
+def second_peak(name: str, light: IlluminatedSpectrum, window_nm: Window) -> str | None:
     """Return what to say of a light whose band on the white reference has two peaks."""
     from scipy.signal import find_peaks  # takes as long to load as half of labrig
 
@@ -55,7 +55,7 @@ def second_peak(name: str, light: LitSpectrum, window_nm: Window) -> str | None:
 
 
 def other_light(
-    name: str, lights: Mapping[str, LitSpectrum], windows_nm: Mapping[str, Window]
+    name: str, lights: Mapping[str, IlluminatedSpectrum], windows_nm: Mapping[str, Window]
 ) -> str | None:
     """Return what to say of a light whose white reading shows another of the lights as well."""
     light = lights[name]
@@ -79,7 +79,7 @@ def other_light(
     return None
 
 
-def part_beyond(light: LitSpectrum, window_nm: Window) -> tuple[float, float]:
+def part_beyond(light: IlluminatedSpectrum, window_nm: Window) -> tuple[float, float]:
     """Return the light of longer wavelength than a light's band over its power, and σ."""
     low_nm, high_nm = window_nm
     nm = light.wavelength_nm
@@ -90,7 +90,7 @@ def part_beyond(light: LitSpectrum, window_nm: Window) -> tuple[float, float]:
 
 
 def light_beyond(
-    name: str, light: LitSpectrum, window_nm: Window, *, is_filter: bool
+    name: str, light: IlluminatedSpectrum, window_nm: Window, *, is_filter: bool
 ) -> Iterator[str]:
     """Yield what to say of light at longer wavelengths than a light's own band."""
     part, sigma = part_beyond(light, window_nm)
@@ -109,7 +109,9 @@ def light_beyond(
         )
 
 
-def disorder(name: str, light: LitSpectrum, window_nm: Window, named_nm: float) -> Iterator[str]:
+def disorder(
+    name: str, light: IlluminatedSpectrum, window_nm: Window, named_nm: float
+) -> Iterator[str]:
     """Yield what to say of a light with another peak than the rig file says."""
     low_nm, high_nm = window_nm
     inside = (light.wavelength_nm >= low_nm) & (light.wavelength_nm <= high_nm)
@@ -189,11 +191,11 @@ def _standing_out(counts: NDArray[np.float64]) -> tuple[float, float]:
     return light, float(ends.std(ddof=1)) * float(np.sqrt(1 / number + 1 / len(ends)))
 
 
-def _integral(light: LitSpectrum, where: NDArray[np.bool_]) -> float:
+def _integral(light: IlluminatedSpectrum, where: NDArray[np.bool_]) -> float:
     return float(np.gradient(light.wavelength_nm)[where] @ light.value[where])
 
 
-def _integral_sigma(light: LitSpectrum, where: NDArray[np.bool_]) -> float:
+def _integral_sigma(light: IlluminatedSpectrum, where: NDArray[np.bool_]) -> float:
     step_nm = np.gradient(light.wavelength_nm)[where]
     sigma = float(np.sqrt(step_nm**2 @ light.sigma[where] ** 2))
     if light.common_sigma is None:

@@ -32,7 +32,7 @@ from labrig.protocols.excitation.analysis.charging_series import evened, patch_c
 from labrig.protocols.excitation.analysis.closure import predicted_charging
 from labrig.protocols.excitation.analysis.lamp_light import (
     LAMP_SIGMA,
-    LARGEST_FACTOR,
+    MAX_FACTOR,
     band_sigma,
     light_scatter,
     remembered_warmth,
@@ -189,7 +189,7 @@ def _patch_excitation(
         scale=scale_sigma(irradiance),
         defining=DIRECT,
         irradiance=band_sigma(irradiance),
-        largest_factor=LARGEST_FACTOR,
+        largest_factor=MAX_FACTOR,
     )
     fits = OrderFits(_series(charging), decay, relative_sigmas, _asked_states(context) is not None)
     choice = fits.chosen(context.options(ExcitationOptions).order)
@@ -288,7 +288,7 @@ def _scale(
 
 
 def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
-    if max((fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes)) > AT_END * LARGEST_FACTOR:
+    if max((fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes)) > AT_END * MAX_FACTOR:
         light = light_scatter(fit)
         places = (
             ""

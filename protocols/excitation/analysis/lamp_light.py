@@ -29,7 +29,7 @@ SITE_SIGMA, WAVELENGTH_SIGMA_NM = 0.03, 1.0
 #: Relative scatter of a lamp's brightness from charge to charge, likewise.
 LAMP_SIGMA = 0.01
 #: Factor of these values up to which sizes are tried.
-LARGEST_FACTOR = 3.0
+MAX_FACTOR = 3.0
 #: Kinds of error whose size the fit finds, in the order of its sizes; and of known size.
 WAVELENGTHS, SITES, KNOWN = 0, 1, -1
 #: Number of smooth modes along the filter: errors are uncorrelated over some 40 nm.

@@ -34,7 +34,7 @@ VEIL_SHAPE = 0.3
 #: Largest number of states that are fitted with orders.
 MAX_STATES = 2
 #: Least part of the glow of a state at the start.
-LEAST_FRACTION = 1e-3
+MIN_FRACTION = 1e-3
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class OrderFits:
         k_r, amplitude = np.array(
             [(state.k_r_per_s, state.amplitude) for state in self.decay.states]
         ).T
-        return k_r, np.maximum(amplitude / amplitude.sum(), LEAST_FRACTION)
+        return k_r, np.maximum(amplitude / amplitude.sum(), MIN_FRACTION)
 
     def _fit(
         self,

@@ -24,7 +24,7 @@ from labrig.results import FittedExcitation
 #: little light, of which the same blocking leaves a larger part.
 STRAY, STRAY_SIGMA = 5e-5, 1.5
 #: Part of a light's strongest band below which its share of another one is taken for exact.
-LEAST_SHARE = 0.01
+MIN_SHARE = 0.01
 #: σ of rates by a smooth course as a part of their difference to those by even bands: excitation
 #: may have steps.
 EVENNESS = 0.5
@@ -80,7 +80,7 @@ def selected_light(
     light = through + stray
     # A band of which a light has hardly anything gets another part of nothing.
     even = cells @ of_band
-    has_light = even > LEAST_SHARE * even.max(axis=1, keepdims=True)
+    has_light = even > MIN_SHARE * even.max(axis=1, keepdims=True)
     own = np.eye(len(through))[..., np.newaxis]
     by_wavelength = np.where(has_light, moved / np.where(has_light, light, 1.0), 0.0)
     modes = [

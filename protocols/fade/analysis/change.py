@@ -30,7 +30,7 @@ LOGIT_SIGMA = 1.5
 #: White and M. L. Minges, Int. J. Thermophysics 18, 1997, 1269).
 COLD_LOSS, COLD_LOSS_SIGMA = 0.42, 0.1
 #: Temperature of the room over the filament's, and least difference to it.
-ROOM, LEAST_ABOVE_ROOM = 295 / 3000, 5e-3
+ROOM, MIN_ABOVE_ROOM = 295 / 3000, 5e-3
 #: Exponent of the temperature that tungsten's resistance is proportional to, and its σ: 1.20 from
 #: 300 K to 3000 K (P. D. Desai et al., J. Phys. Chem. Ref. Data 13, 1984, 1069); leads and gas do
 #: the rest.
@@ -40,7 +40,7 @@ U_GRID: FloatArray = DARK * np.linspace(0.0, 1.0, 1001) ** 2
 #: Values of −ln(1 − T) between which its heating is, from the room's temperature to where u < 1e-5,
 #: and the least gain of heat by what is missing of T.
 HEATING_GRID: FloatArray = np.linspace(-np.log(1 - ROOM), 14.0, 1001)
-LEAST_GAIN = 1e-3
+MIN_GAIN = 1e-3
 #: Step of the derivatives as a fraction of σ.
 STEP = 0.01
 #: Places of p and of the lag among the parameters of all shapes.
@@ -138,7 +138,7 @@ class Heating:
         missing = np.exp(-HEATING_GRID)
         temperature = 1 - missing
         heat_capacity, lost = _capacity_and_loss(temperature, parameters)
-        gained = np.maximum(temperature ** -parameters[4] - lost, LEAST_GAIN * missing)
+        gained = np.maximum(temperature ** -parameters[4] - lost, MIN_GAIN * missing)
         seconds_per_step = heat_capacity * missing / (gained * rate / 4)
         steps_s = np.diff(HEATING_GRID) * (seconds_per_step[1:] + seconds_per_step[:-1]) / 2
         left = np.exp(-np.interp(t_s, np.append(0.0, np.cumsum(steps_s)), HEATING_GRID))
@@ -156,7 +156,7 @@ def _capacity_and_loss(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the filament's heat capacity and loss of heat over those of the steady lamp."""
     radiated = 1 / (1 + np.exp(-parameters[2]))
-    above_room = np.maximum(temperature - ROOM, LEAST_ABOVE_ROOM) / (1 - ROOM)
+    above_room = np.maximum(temperature - ROOM, MIN_ABOVE_ROOM) / (1 - ROOM)
     lost = radiated * temperature**5 + (1 - radiated) * above_room
     return 1 - parameters[3] * (1 - temperature**2), lost
 

@@ -9,7 +9,7 @@ from scipy.special import chdtrc
 
 from labrig.acquire import LEDS, bank_lights
 from labrig.analyse.inputs import AnalysisContext
-from labrig.bench_optics import DATA_SHEET_NM, camera_curves, card_reflectance, led_exposures
+from labrig.bench_optics import DATA_SHEET_NM, camera_curves, card_reflectance, led_sources
 from labrig.calibration import UV_NM, CalibratedLed, LedsFile, LedSource, UvScale
 from labrig.fit.leds import (
     RESPONSE_CALIBRATED,
@@ -97,7 +97,7 @@ def _is_card(unit: str) -> bool:
 
 def _bank(context: AnalysisContext) -> Bank:
     source = str(context.run.folder)
-    exposures = led_exposures(context.rig, source)
+    exposures = led_sources(context.rig, source)
     camera = camera_curves(context.rig, context.overrides.camera)
     nominal = {name: exposure.light for name, exposure in exposures.items()}
     lights = bank_lights(context.rig, LEDS.key, source)

@@ -18,11 +18,11 @@ from labrig.analyse.card_checks import (
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.lit_patches import LightKind, LitPatch, lit_patches, lit_system, mean_of
 from labrig.bench_optics import (
-    LedExposure,
+    LightSource,
     camera_curves,
     card_reflectance,
-    illuminant_exposures,
-    led_exposures,
+    illuminant_sources,
+    led_sources,
 )
 from labrig.calibration import LEDS_KIND
 from labrig.fit.fluorescence import (
@@ -165,7 +165,7 @@ class _Lit:
 
 def _lit(
     context: AnalysisContext,
-    lights: Mapping[str, LedExposure],
+    lights: Mapping[str, LightSource],
     camera: CameraResponse,
     white: Transmittance,
 ) -> _Lit:
@@ -242,7 +242,7 @@ def _usable(
     return usable, of(lamps, len(leds), "lamp") if lamps else UsableLights({}, (), (), {})
 
 
-def _lights(context: AnalysisContext) -> dict[str, LedExposure]:
+def _lights(context: AnalysisContext) -> dict[str, LightSource]:
     """Return the lights of the protocol by name, LEDs and lamps.
 
     Raises
@@ -251,12 +251,12 @@ def _lights(context: AnalysisContext) -> dict[str, LedExposure]:
         The rig file lacks one of them.
     """
     protocol = context.protocol
-    lights = led_exposures(context.rig, "rig.yaml", context.inputs[LEDS_KIND])
+    lights = led_sources(context.rig, "rig.yaml", context.inputs[LEDS_KIND])
     if unknown := [led for led in protocol.leds if led not in lights]:
         raise UsageError(f"rig.yaml: expected LEDs called {', '.join(unknown)}, got none")
     if not protocol.lamps:
         return lights
-    lamps = illuminant_exposures(context.rig, "rig.yaml")
+    lamps = illuminant_sources(context.rig, "rig.yaml")
     if unknown := [lamp for lamp in protocol.lamps if lamp not in lamps]:
         raise UsageError(f"rig.yaml: expected lamps called {', '.join(unknown)}, got none")
     return lights | {lamp: lamps[lamp] for lamp in protocol.lamps}

@@ -164,7 +164,7 @@ def missing_samples(direct: DirectMeasurement, names: Iterable[str]) -> list[str
 COMPONENTS = 3
 #: Least part of the strongest entry that counts as re-radiation. An estimate is smooth, and errors
 #: of its entries have the same sign: σ of each would leave out what belongs to the dye.
-LEAST_PART = 0.01
+MIN_PART = 0.01
 
 
 def mixture_of(matrix: ReradiationMatrix, is_extrapolated: BoolArray) -> MixtureOfMatrix | None:
@@ -180,7 +180,7 @@ def mixture_of(matrix: ReradiationMatrix, is_extrapolated: BoolArray) -> Mixture
     unknown = np.broadcast_to(is_extrapolated, matrix.reradiation.shape)
     lit = replace(matrix, reradiation=np.where(unknown, np.nan, matrix.reradiation))
     per_band = lit.reradiation * lit.output_width_nm[:, np.newaxis]
-    threshold = LEAST_PART * float(np.nanmax(np.where(lit.is_stokes, per_band, 0.0)))
+    threshold = MIN_PART * float(np.nanmax(np.where(lit.is_stokes, per_band, 0.0)))
     if not threshold > 0:
         return None
     try:

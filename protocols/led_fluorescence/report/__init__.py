@@ -35,7 +35,7 @@ UV_SCALE = {
     "none": "No LED is in the ultraviolet: what that excites is extrapolated.",
 }
 #: Number of samples beyond which each is folded up.
-MOST_OPEN = 4
+MAX_OPEN = 4
 
 
 @dataclass(frozen=True)
@@ -229,7 +229,7 @@ def _sample(
     ]
     page = SamplePage(
         number=number,
-        is_folded=len(result.patches) > MOST_OPEN,
+        is_folded=len(result.patches) > MAX_OPEN,
         photographed=tuple(_lit_pairs(patch, result, screen)),
         colours_known=screen.known,
         halves=len(halves),

@@ -50,7 +50,7 @@ THIRD_WIDTH_PT, THIRD_HEIGHT_PT = 286.0, 190.0
 THIRD_MARGINS = Margins(top=10.0)
 #: Part of the strongest re-radiation below which a light is left out, and largest σ of a number
 #: that is drawn, of the strongest one under its light.
-LEAST_SHOWN, WORST_SHOWN = 0.03, 0.1
+MIN_SHOWN, WORST_SHOWN = 0.03, 0.1
 
 
 def matrix_figure(matrix: ReradiationMatrix, is_extrapolated: NDArray[np.bool_]) -> "Figure":
@@ -139,7 +139,7 @@ def methods_charts(patch: FluorescentPatch) -> dict[str, Chart]:
     return {
         each.light: _methods_chart(each)
         for each in patch.under_lights
-        if strongest[each.light] > LEAST_SHOWN * top
+        if strongest[each.light] > MIN_SHOWN * top
     }
 
 

@@ -51,7 +51,7 @@ LIMITS_NM = (360.0, 830.0)
 #: their widths at half maximum, and number of candidates.
 BAND_NM, MEDIAN_FWHM_NM, SPREAD_FWHM, CANDIDATES = (420.0, 670.0), 75.0, 0.35, 5000
 #: Noise of the colour's channels, at least.
-LEAST_NOISE = 1e-3
+MIN_NOISE = 1e-3
 #: Relative σ of an estimated emission's luminance that is told.
 OPEN = 0.06
 #: Probability of a colour below which it is doubted.
@@ -113,7 +113,7 @@ class ColourScale:
         if not self.has_ratios:
             return None
         logs = np.log(card / self.expected_card)
-        if _probability(logs, self.card_errors, max(sigma, LEAST_NOISE)) > DOUBTED:
+        if _probability(logs, self.card_errors, max(sigma, MIN_NOISE)) > DOUBTED:
             return None
         off = np.exp(logs - logs[np.argmax(card)])
         text = ", ".join(f"{factor:.2f}" for factor in off)
@@ -210,7 +210,7 @@ def colour_scale(
     knots = [] if known is None else [known.spectrum.wavelength_nm]
     nodes, step = quadrature(*LIMITS_NM, camera.wavelength_nm, KNOTS_NM, *knots)
     bench = _Bench.of(nodes, step, camera, card, lamp)
-    noise = np.maximum(noise, LEAST_NOISE * colour)
+    noise = np.maximum(noise, MIN_NOISE * colour)
     if known is not None:
         shape, shapes = known.spectrum.at(nodes), _smooth_errors(nodes, known.spectrum, known.error)
         nm, spectrum = known.spectrum.wavelength_nm, known.spectrum.value

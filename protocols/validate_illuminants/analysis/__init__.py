@@ -12,10 +12,10 @@ from labrig.analyse.chart_scene import camera_matrix
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.lit_patches import LitPatch, lit_patches
 from labrig.bench_optics import (
-    LedExposure,
+    LightSource,
     camera_curves,
     card_reflectance,
-    illuminant_exposures,
+    illuminant_sources,
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
@@ -56,7 +56,7 @@ def analyse(context: AnalysisContext) -> ValidateIlluminantsResult:
     """
     protocol, names = context.protocol, context.protocol.lamps
     matrices = matrices_of(protocol)
-    lights = illuminant_exposures(context.rig, "rig.yaml")
+    lights = illuminant_sources(context.rig, "rig.yaml")
     if unknown := [lamp for lamp in names if lamp not in lights]:
         raise UsageError(f"rig.yaml: expected lamps called {', '.join(unknown)}, got none")
     camera, white = (
@@ -130,7 +130,7 @@ class _Colours:
 
 def _colours(
     context: AnalysisContext,
-    lights: Mapping[str, LedExposure],
+    lights: Mapping[str, LightSource],
     camera: CameraResponse,
     usable: UsableLights,
     white: FloatArray,
@@ -162,7 +162,7 @@ def _colours(
 
 def _lamp(
     row: int,
-    lamp: LedExposure,
+    lamp: LightSource,
     samples: Mapping[str, LitPatch],
     cards: Mapping[str, LitPatch],
     predicted: Mapping[str, PredictedValues],

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from labrig.analyse.lit_patches import CARD_COURSE, CARD_SIGMA, LitPatch, exposure_of
-from labrig.bench_optics import LedExposure
+from labrig.bench_optics import LightSource
 from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
 from labrig.foundation.arrays import FloatArray
@@ -67,7 +67,7 @@ class PredictedValues:
 
 def predicted_values(
     matrix: ReradiationMatrix,
-    lamps: Sequence[LedExposure],
+    lamps: Sequence[LightSource],
     camera: CameraResponse,
     white: Transmittance,
     card: LitPatch,

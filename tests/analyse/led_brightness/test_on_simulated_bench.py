@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.bench_optics import led_exposures
+from labrig.bench_optics import led_sources
 from labrig.calibration import LEDS_KIND
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
@@ -86,7 +86,7 @@ def test_spectra_and_brightnesses_are_the_rooms_and_come_back_from_files(tmp_pat
 
     assert_read_back(result)
     assert result.calibration == LEDS_KIND.read(run)
-    exposures = led_exposures(part_of(run).rig, "rig", result.calibration)
+    exposures = led_sources(part_of(run).rig, "rig", result.calibration)
     assert all(math.isfinite(one.brightness_sigma) for one in exposures.values())
     page = (run / "result" / "report.html").read_text(encoding="utf-8")
     assert "Brightness of the LEDs" in page

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.analyse.lit_patches import CARD_COURSE, CARD_SIGMA, LitPatch, exposure_of
-from labrig.bench_optics import LedExposure
+from labrig.bench_optics import LightSource
 from labrig.fit.fluorescence import FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL
 from labrig.material import ReradiationMatrix
@@ -21,8 +21,8 @@ FLICKER = 0.002
 DRAWS = 40
 
 
-def lamp(name: str) -> LedExposure:
-    return LedExposure(read_light(name), 1.0, np.inf, 0.0, is_lamp=True)
+def lamp(name: str) -> LightSource:
+    return LightSource(read_light(name), 1.0, np.inf, 0.0, is_lamp=True)
 
 
 def surface() -> ReradiationMatrix:

@@ -50,11 +50,11 @@ def test_a_session_with_the_simulated_camera() -> None:
         assert "libgphoto2 2." in camera.identity()
         assert {finding.severity for finding in camera.findings()} == {"fine", "warn"}
 
-        offers = camera.offers()
-        assert len(offers.exposures_s) == 55
-        assert (offers.exposures_s[0], offers.exposures_s[-1]) == (1 / 8192, 32.0)
-        assert offers.isos == (100, 200, 400, 800, 1600)
-        assert (offers.f_numbers[0], offers.f_numbers[-1]) == (1.8, 22.0)
+        capabilities = camera.capabilities()
+        assert len(capabilities.exposures_s) == 55
+        assert (capabilities.exposures_s[0], capabilities.exposures_s[-1]) == (1 / 8192, 32.0)
+        assert capabilities.isos == (100, 200, 400, 800, 1600)
+        assert (capabilities.f_numbers[0], capabilities.f_numbers[-1]) == (1.8, 22.0)
 
         assert camera.configure(ExposureSettings(1 / 60, 400, 5.6)) == SHORT
         camera.make_safe()
@@ -140,7 +140,7 @@ def test_libgphoto2_that_does_not_answer_is_ended(helpers: Processes) -> None:
     with photographing(FastClock()) as (camera, _):
         helpers[0].send_signal(signal.SIGSTOP)
         with pytest.raises(DeviceLostError, match="no answer from libgphoto2 within 25 s"):
-            camera.offers()
+            camera.capabilities()
 
 
 def test_libgphoto2_that_crashes_is_lost_for_now(helpers: Processes) -> None:

@@ -33,11 +33,11 @@ def test_a_nikon_is_prepared_set_and_released(toy: ToyBench) -> None:
             "Nikon Corporation D7000, serial unknown, firmware unknown, released by libgphoto2 "
             "toy, trigger_capture"
         )
-        offers = camera.offers()
-        assert offers.exposures_s[:2] == (1 / 8192, 1 / 128)
-        assert offers.exposures_s[-3:] == (2 ** (1 / 3), 2.0, 32.0)
-        assert offers.isos == (100, 200, 400, 800, 1600)
-        assert offers.f_numbers == (4.0, 4.5, 5.0, 5.6, 8.0)
+        capabilities = camera.capabilities()
+        assert capabilities.exposures_s[:2] == (1 / 8192, 1 / 128)
+        assert capabilities.exposures_s[-3:] == (2 ** (1 / 3), 2.0, 32.0)
+        assert capabilities.isos == (100, 200, 400, 800, 1600)
+        assert capabilities.f_numbers == (4.0, 4.5, 5.0, 5.6, 8.0)
         assert camera.configure(ExposureSettings(1 / 60, 400, 8.0)) == SETTINGS
         frame = camera.shoot()
         assert (frame.data, frame.suffix, frame.settings) == (TIFF, ".nef", SETTINGS)
@@ -108,7 +108,7 @@ def test_a_camera_that_cannot_be_measured_with(
 )
 def test_nothing_to_offer(toy: ToyBench, changes: dict[str, list[str]], why: str) -> None:
     with toy.connected(changes) as camera, pytest.raises(DeviceError, match=why):
-        camera.offers()
+        camera.capabilities()
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ def test_a_camera_without_live_view(toy: ToyBench) -> None:
 
 def test_a_manual_lens(toy: ToyBench) -> None:
     with toy.connected({"f-number": []}, {"files": [NEF]}) as camera:
-        assert camera.offers().f_numbers == ()
+        assert camera.capabilities().f_numbers == ()
         wanted = ExposureSettings(1 / 64, 400)
         assert camera.configure(wanted) == wanted
         with pytest.raises(DeviceError, match="set it by hand and leave f_number out"):
@@ -231,10 +231,10 @@ def test_the_extra_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_planning_needs_neither_camera_nor_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     settings = Gphoto2Camera.Settings.model_validate({"isos": [1600, 100], "frame_time": "3 s"})
-    offers = settings.planned_offers()
-    assert offers.isos == (100, 1600)
-    assert (offers.exposures_s[0], offers.exposures_s[-1]) == (1 / 8192, 32.0)
-    assert offers.overhead_s == 3.0
+    capabilities = settings.planned_offers()
+    assert capabilities.isos == (100, 1600)
+    assert (capabilities.exposures_s[0], capabilities.exposures_s[-1]) == (1 / 8192, 32.0)
+    assert capabilities.overhead_s == 3.0
 
 
 def test_the_virtual_nikon_that_comes_with_libgphoto2(

@@ -165,7 +165,7 @@ def test_a_camera_that_babbles_costs_neither_time_nor_memory() -> None:
     camera = b.connect()
     many = (written(ValueChanged(prop, b"x" * 40)) for prop in range(0x20000, 0x22000))
     b.toy.events.append(b"".join(many))
-    assert camera.offers().isos
+    assert camera.capabilities().isos
     files = (written(ObjectOffered(n, 0xB103, 1000, f"{n}.CR2")) for n in range(5_000))
     b.toy.events.append(b"".join(files))
     with pytest.raises(DeviceError, match="at most 1000 frames in the camera, it offers 5000"):

@@ -14,7 +14,7 @@ from labrig.acquire import (
     ExposureSettings,
     ProtocolModel,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
 )
 from labrig.foundation.quantity import Count, DurationS
@@ -64,10 +64,10 @@ class CardUnit:
         """Photograph the card; a plan runs this, too, with devices that only take notes."""
         protocol = self.protocol
         session.wait_until_warm("camera")
-        offers = session.rig[CAMERA].offers()
-        settings = ExposureSettings(offers.exposure_at_most(protocol.exposure), 100, 4.0)
+        capabilities = session.rig[CAMERA].capabilities()
+        settings = ExposureSettings(capabilities.exposure_at_most(protocol.exposure), 100, 4.0)
         session.perform(LAMP_ON)
         for _ in range(protocol.frames):
             session.wait(protocol.every, "lamp burns")
-            session.perform(Shoot(DriftFrames.CARD, settings))
+            session.perform(TakeFrame(DriftFrames.CARD, settings))
         session.perform(LAMP_OFF)

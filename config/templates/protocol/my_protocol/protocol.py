@@ -14,7 +14,7 @@ from labrig.acquire import (
     ExposureSettings,
     ProtocolModel,
     Session,
-    Shoot,
+    TakeFrame,
     Unit,
     at,
 )
@@ -71,13 +71,13 @@ class GlowUnit:
         """
         protocol = self.protocol
         session.wait_until_warm("camera")
-        offers = session.rig[CAMERA].offers()
-        settings = ExposureSettings(offers.exposure_at_most(protocol.exposure), 400, 4.0)
+        capabilities = session.rig[CAMERA].capabilities()
+        settings = ExposureSettings(capabilities.exposure_at_most(protocol.exposure), 400, 4.0)
         session.perform(LAMP_ON)
         session.wait(protocol.charge, "charging")
         # A sequence keeps to the times since its begin, whatever each photograph takes.
         shots = [
-            at(1.0 + number * protocol.every, Shoot(MyProtocolFrames.GLOW, settings))
+            at(1.0 + number * protocol.every, TakeFrame(MyProtocolFrames.GLOW, settings))
             for number in range(protocol.frames)
         ]
         session.run_sequence([at(0.0, LAMP_OFF), *shots])

@@ -29,7 +29,7 @@ _END = "EOD"
 _HEAD = "VEC_01\t5167\nBFC-450 Matrix File"
 _UNKNOWN = "<none>"
 #: Limit of either grid, which excludes broken headers.
-_MOST_BANDS = 2000
+_MAX_BANDS = 2000
 #: Limit of every integer of the header, above that of its wavelengths and numbers.
 _LARGEST = 1_000_000
 
@@ -69,8 +69,8 @@ def _grids(line: Line) -> tuple[FloatArray, FloatArray]:
     if min(out_step, in_step) < 1 or out_end < out_start or (out_end - out_start) % out_step:
         raise ValueError(f"{expected}; got steps that do not fit in {shown(line.text)}")
     n_out = (out_end - out_start) // out_step + 1
-    if not (2 <= n_in <= _MOST_BANDS and 2 <= n_out <= _MOST_BANDS):
-        raise ValueError(f"{expected}, 2 to {_MOST_BANDS} of either; got {shown(line.text)}")
+    if not (2 <= n_in <= _MAX_BANDS and 2 <= n_out <= _MAX_BANDS):
+        raise ValueError(f"{expected}, 2 to {_MAX_BANDS} of either; got {shown(line.text)}")
     output_nm = out_start + out_step * np.arange(n_out, dtype=np.float64)
     input_nm = in_start + in_step * np.arange(n_in, dtype=np.float64)
     for nm in (output_nm, input_nm):

@@ -43,7 +43,7 @@ _WIDER = 1.5
 #: A line ends where it is no more than this many times what is beside it.
 _END_RATIO = 1.5
 #: Plateau of a detector that is saturated: fewest entries, each beside another one.
-_FEWEST_SATURATED = 3
+_MIN_SATURATED = 3
 
 
 class _Line(NamedTuple):
@@ -177,7 +177,7 @@ def _saturated(intensity: FloatArray) -> BoolArray:
             else (np.zeros(intensity.shape, dtype=bool))
         )
     pairs = (is_top[1:] & is_top[:-1]).sum()
-    return is_top if pairs >= _FEWEST_SATURATED - 1 else np.zeros(intensity.shape, dtype=bool)
+    return is_top if pairs >= _MIN_SATURATED - 1 else np.zeros(intensity.shape, dtype=bool)
 
 
 _logger = logging.getLogger(__name__)

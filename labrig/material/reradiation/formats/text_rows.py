@@ -13,7 +13,7 @@ from labrig.material.reradiation.matrix import ReradiationMatrix, are_same_bands
 #: Range of wavelengths in nm, which excludes tables in µm or in Hz.
 PLAUSIBLE_NM = (100.0, 20_000.0)
 #: Largest magnitude of a fraction that is no fault of the file.
-LARGEST_FRACTION = 2.0
+MAX_FRACTION = 2.0
 #: Characters of a line that a message repeats.
 _SHOWN = 30
 
@@ -91,11 +91,11 @@ def check_wavelengths(nm: FloatArray, place: str = "") -> None:
 
 def check_fractions(values: Sequence[float], place: str) -> None:
     """Raise ValueError if a fraction per band is absurd; NaN is none."""
-    absurd = next((value for value in values if abs(value) > LARGEST_FRACTION), None)
+    absurd = next((value for value in values if abs(value) > MAX_FRACTION), None)
     if absurd is not None:
         raise ValueError(
             f"{place}: expected fractions, got {absurd:g}, which is above "
-            f"{LARGEST_FRACTION:g} in magnitude"
+            f"{MAX_FRACTION:g} in magnitude"
         )
 
 

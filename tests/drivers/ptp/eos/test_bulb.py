@@ -81,20 +81,20 @@ def test_between_bulb_and_the_dial_and_back() -> None:
 class TestOffers:
     def test_doubling_from_64_s_to_the_longest(self) -> None:
         _, camera = long_bench()
-        assert camera.offers().exposures_s == (1 / 128, 1 / 64, 1.0, 32.0, 64.0, 128.0)
+        assert camera.capabilities().exposures_s == (1 / 128, 1 / 64, 1.0, 32.0, 64.0, 128.0)
         settings = PtpCamera.Settings.model_validate({"longest_exposure": "300 s"})
         assert settings.planned_offers().exposures_s[-4:] == (32.0, 64.0, 128.0, 256.0)
 
     def test_none_unless_the_rig_file_asks(self) -> None:
         b = bench(ToyEos(WITH_COMMANDS))
-        assert max(b.connect().offers().exposures_s) == 32.0
+        assert max(b.connect().capabilities().exposures_s) == 32.0
         assert max(PtpCamera.Settings().planned_offers().exposures_s) == 32.0
 
     def test_none_where_the_camera_has_none(self) -> None:
         b = bench(ToyEos(WITH_COMMANDS))
         b.toy.lists[0xD102] = (0x10, 0x38)
         camera = b.connect(longest_exposure="64 s")
-        assert camera.offers().exposures_s == (1.0, 32.0)
+        assert camera.capabilities().exposures_s == (1.0, 32.0)
         (said,) = [str(found) for found in camera.findings() if "bulb" in found.what]
         assert "turn its dial to B" in said
         with pytest.raises(DeviceError, match="turn its dial to B"):
@@ -103,13 +103,13 @@ class TestOffers:
     def test_a_button_that_acts_at_once_cannot_be_held(self) -> None:
         one_stage = (*(op for op in OPERATIONS if op not in (0x9128, 0x9129)), 0x910F)
         b = bench(ToyEos(one_stage))
-        assert max(b.connect(longest_exposure="64 s").offers().exposures_s) == 32.0
+        assert max(b.connect(longest_exposure="64 s").capabilities().exposures_s) == 32.0
 
     def test_a_dial_at_b_offers_nothing_else(self) -> None:
         b = bench(ToyEos(WITH_COMMANDS))
         b.toy.values[0xD105], b.toy.values[0xD102] = u32(4), u32(BULB)
         camera = b.connect(longest_exposure="64 s")
-        assert camera.offers().exposures_s == (64.0,)
+        assert camera.capabilities().exposures_s == (64.0,)
         assert [f.what for f in camera.findings() if "dial at B" in f.what]
         frame = photograph(camera, LONG)
         assert frame.settings.exposure_s == pytest.approx(64.0, abs=0.01)
@@ -123,7 +123,7 @@ class TestOffers:
         (refused,) = [str(found) for found in camera.findings() if found.severity == "refuse"]
         assert "dial is at B" in refused
         with pytest.raises(DeviceError, match="turn the dial to M"):
-            camera.offers()
+            camera.capabilities()
 
 
 @pytest.mark.parametrize("fault", BROKEN, ids=lambda f: f.name.lower())

@@ -8,7 +8,7 @@ import pytest
 import usb.core
 
 from labrig.acquire import Camera
-from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.acquire.values import CameraCapabilities, ExposureSettings
 from labrig.drivers.ptp import PtpCamera
 from labrig.foundation.errors import DeviceError
 
@@ -47,7 +47,7 @@ def test_offers_what_the_camera_lists_and_the_rig_allows() -> None:
     camera = bench().connect(
         isos=(200, 400, 6400), longest_exposure="1 s", frame_time="3 s", frame_size="25 MB"
     )
-    assert camera.offers() == CameraOffers(
+    assert camera.capabilities() == CameraCapabilities(
         exposures_s=(1 / 128, 1 / 64, 1.0),
         isos=(200, 6400),
         f_numbers=(4.0, 5.6),
@@ -60,19 +60,21 @@ def test_offers_follow_the_camera() -> None:
     b = bench()
     camera = b.connect()
     b.toy.events.append(choices_changed(0xD101, (0x38,)))
-    assert camera.offers().f_numbers == (8.0,)
+    assert camera.capabilities().f_numbers == (8.0,)
 
 
 def test_declared_offers_are_thirds_of_stops_by_their_true_times() -> None:
     settings = PtpCamera.Settings.model_validate({"longest_exposure": "1 s", "isos": [400, 100]})
-    offers = settings.planned_offers()
-    assert offers.exposures_s[-1] == 1.0
-    assert offers.exposures_s[0] == 1 / 8192
-    ratios = {b / a for a, b in zip(offers.exposures_s, offers.exposures_s[1:], strict=False)}
+    capabilities = settings.planned_offers()
+    assert capabilities.exposures_s[-1] == 1.0
+    assert capabilities.exposures_s[0] == 1 / 8192
+    ratios = {
+        b / a for a, b in zip(capabilities.exposures_s, capabilities.exposures_s[1:], strict=False)
+    }
     assert all(math.isclose(r, 2 ** (1 / 3)) for r in ratios)
-    assert offers.isos == (100, 400)
-    assert offers.overhead_s == settings.frame_time
-    assert offers.frame_pixels is None
+    assert capabilities.isos == (100, 400)
+    assert capabilities.overhead_s == settings.frame_time
+    assert capabilities.frame_pixels is None
     for given, frame_bytes in (
         ({"frame_size": "27 MB"}, 27_000_000),
         ({"frame_pixels": [5634, 3752]}, 1.5 * 5634 * 3752),
@@ -140,7 +142,7 @@ def test_manual_lens() -> None:
     b.toy.values[0xD101] = u32(0)
     b.toy.lists[0xD101] = ()
     camera = b.connect()
-    assert camera.offers().f_numbers == ()
+    assert camera.capabilities().f_numbers == ()
     assert photograph(camera, ExposureSettings(1 / 64, 100)).settings.f_number is None
     with pytest.raises(DeviceError, match="by hand"):
         camera.configure(SHORT)
@@ -163,14 +165,14 @@ def test_wrong_dial_offers_nothing() -> None:
     b.toy.values[0xD105] = u32(0)
     camera = b.connect()
     with pytest.raises(DeviceError, match="dial"):
-        camera.offers()
+        camera.capabilities()
 
 
 def test_a_dial_without_lists_is_reported() -> None:
     b = bench()
     b.toy.lists[0xD102] = ()
     with pytest.raises(DeviceError, match="turn its dial to M"):
-        b.connect().offers()
+        b.connect().capabilities()
 
 
 def test_shoot_measures_the_press_that_succeeded() -> None:

@@ -113,7 +113,7 @@ def test_native_isos_are_those_of_the_model(model: str, highest: int, is_known: 
     toy.model = model
     toy.lists[0xD103] = (0x00, *range(0x48, 0x89))
     camera = bench(toy).connect()
-    isos = camera.offers().isos
+    isos = camera.capabilities().isos
     assert isos == tuple(100 * 2**stop for stop in range(len(isos)))
     assert isos[-1] == highest
     warned = [found for found in camera.findings() if "ISOs of a" in found.what]

@@ -173,7 +173,7 @@ def test_hopeless_camera_is_reported_by_make_safe() -> None:
     camera = b.connect()
     b.toy.faults[(0x9116,)] = [Fault.SILENT]
     with pytest.raises(DeviceError):
-        camera.offers()
+        camera.capabilities()
     b.toy.status = 0x2019
     with pytest.raises(DeviceError, match="0x2019 DeviceBusy"):
         camera.make_safe()

@@ -6,14 +6,14 @@ Texts in quotes stand for PTP strings (u8 letters, UTF-16, closing zero).
 
 import pytest
 
-from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.acquire.values import CameraCapabilities, ExposureSettings
 from labrig.drivers.ptp import PtpCamera
 from labrig.foundation.clock import VirtualClock
 
 from ..usb.wire import TRANSACTION_S, OneDevice, Wire
 from .transcript import CONNECT, Transcript
 
-#: After `offers()`; Tv is the only setting that is not in force already.
+#: After `capabilities()`; Tv is the only setting that is not in force already.
 CONFIGURE = """
 > 0c000000 0100 1691 0e000000
 < 0c000000 0300 0120 0e000000
@@ -103,7 +103,7 @@ def test_from_plug_to_leave(frame: bytes, empty_packets: bool) -> None:
     camera = PtpCamera("usb://04a9:3199", settings, OneDevice(wire))
     assert camera.identity() == "Canon EOS X, serial 123, firmware 2.1.2"
 
-    assert camera.offers() == CameraOffers(
+    assert camera.capabilities() == CameraCapabilities(
         (1 / 128, 1 / 64), (100, 200), (4.0, 5.6), overhead_s=2.0, frame_bytes=30_000_000
     )
     assert camera.configure(ExposureSettings(1 / 60, 100, 4.0)) == ExposureSettings(

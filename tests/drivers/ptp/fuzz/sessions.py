@@ -21,7 +21,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from labrig.acquire.connections import Connections
-from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.acquire.values import CameraCapabilities, ExposureSettings
 from labrig.drivers.ptp import PtpCamera
 from labrig.drivers.ptp.failures import MalformedError, RefusedError
 from labrig.foundation.clock import VirtualClock
@@ -191,14 +191,18 @@ def _mended(camera: PtpCamera, tally: Tally) -> bytes | None:
 
 
 def _photograph(camera: PtpCamera, exposure_s: float = 1 / 64) -> bytes:
-    camera.configure(_settings(camera.offers(), exposure_s))
+    camera.configure(_settings(camera.capabilities(), exposure_s))
     camera.arm()
     return camera.shoot().data
 
 
-def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
-    f_number = offers.f_numbers[len(offers.f_numbers) // 2] if offers.f_numbers else None
-    return ExposureSettings(offers.exposure_at_most(exposure_s), offers.isos[-1], f_number)
+def _settings(capabilities: CameraCapabilities, exposure_s: float) -> ExposureSettings:
+    f_number = (
+        capabilities.f_numbers[len(capabilities.f_numbers) // 2] if capabilities.f_numbers else None
+    )
+    return ExposureSettings(
+        capabilities.exposure_at_most(exposure_s), capabilities.isos[-1], f_number
+    )
 
 
 def _use(
@@ -215,8 +219,8 @@ def _use(
     acts: list[Callable[[], object]] = [
         camera.findings,
         camera.preview,
-        camera.offers,
-        lambda: camera.configure(_settings(camera.offers(), rng.choice((0.1, 1.0, 8.0)))),
+        camera.capabilities,
+        lambda: camera.configure(_settings(camera.capabilities(), rng.choice((0.1, 1.0, 8.0)))),
         camera.arm,
         camera.shoot,
         camera.keep_awake,

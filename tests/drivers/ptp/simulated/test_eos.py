@@ -150,7 +150,7 @@ def test_what_the_camera_does_not_offer_is_refused() -> None:
     *_, driver = bench()
     with pytest.raises(DeviceError, match="ISO"):
         driver.configure(ExposureSettings(1.0, 125, 4.0))
-    assert 400 in driver.offers().isos
+    assert 400 in driver.capabilities().isos
 
 
 class Nobody:

@@ -63,7 +63,7 @@ class Bench:
 )
 def test_frames_say_how_long_they_were_exposed(body: BodySettings) -> None:
     bench = Bench(body)
-    assert bench.driver.offers().exposures_s[-2:] == (64.0, 128.0)
+    assert bench.driver.capabilities().exposures_s[-2:] == (64.0, 128.0)
     for exposure_s in (64.0, 128.0):
         bench.expect_a_good_frame(ExposureSettings(exposure_s, 400, 4.0))
     if body.exposure_mode == "M":

@@ -84,11 +84,13 @@ def test_frames_arrive_whole_with_their_times(size: int) -> None:
 
 def test_it_offers_what_the_camera_lists_and_a_dial_label_is_understood() -> None:
     *_, driver = bench(rig={"isos": [100, 400], "longest_exposure": "10 s"})
-    offers = driver.offers()
-    assert offers.isos == (100, 400)
-    assert offers.exposures_s[0] == pytest.approx(0.0025), "shorter ones are told too coarsely"
-    assert offers.exposures_s[-1] == pytest.approx(8.0)
-    assert offers.f_numbers[:2] == (1.8, 2.0)
+    capabilities = driver.capabilities()
+    assert capabilities.isos == (100, 400)
+    assert capabilities.exposures_s[0] == pytest.approx(0.0025), (
+        "shorter ones are told too coarsely"
+    )
+    assert capabilities.exposures_s[-1] == pytest.approx(8.0)
+    assert capabilities.f_numbers[:2] == (1.8, 2.0)
     in_force = driver.configure(ExposureSettings(1 / 60, 400, 5.6))
     assert in_force == ExposureSettings(0.0156, 400, 5.6)
 
@@ -171,7 +173,7 @@ def test_a_well_set_camera_is_refused_nothing_but_warned_of_what_cannot_be_repor
 
 def test_a_wrong_dial_photographs_nothing() -> None:
     _, picture, _, driver = bench(exposure_mode="P")
-    for attempt in (driver.offers, driver.shoot, lambda: driver.configure(SETTINGS)):
+    for attempt in (driver.capabilities, driver.shoot, lambda: driver.configure(SETTINGS)):
         with pytest.raises(DeviceError, match="manual exposure"):
             attempt()
     assert picture.taken == []

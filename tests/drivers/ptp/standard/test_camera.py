@@ -240,8 +240,12 @@ def test_what_cannot_work_is_refused(changed: dict[str, Any], said: str) -> None
 
 def test_what_cannot_be_set_is_offered_as_it_stands() -> None:
     camera = connect(toy(usual(1)))
-    offers = camera.offers()
-    assert (offers.exposures_s, offers.isos, offers.f_numbers) == ((1.0,), (400,), ())
+    capabilities = camera.capabilities()
+    assert (capabilities.exposures_s, capabilities.isos, capabilities.f_numbers) == (
+        (1.0,),
+        (400,),
+        (),
+    )
     assert camera.configure(ExposureSettings(1.0, 400)) == ExposureSettings(1.0, 400)
     for settings, what in (
         (ExposureSettings(2.0, 400), "shutter time"),
@@ -279,12 +283,12 @@ def test_a_camera_that_does_not_tell_its_iso_is_used_at_the_rig_files_only_one()
     assert camera.shoot().settings.iso == 800
     assert any("the rig file says 800" in each.what for each in camera.findings())
     with pytest.raises(DeviceError, match="that one alone"):
-        connect(t).offers()
+        connect(t).capabilities()
 
 
 @pytest.mark.parametrize("units", [0, 24, 400_000, 0xFFFFFFFF])
 def test_a_shutter_time_that_is_none_is_refused(units: int) -> None:
     t = replace(toy(), properties={0x500D: (6, units), 0x500F: (4, 400)})
-    for attempt in (connect(t).offers, connect(t).arm):
+    for attempt in (connect(t).capabilities, connect(t).arm):
         with pytest.raises(DeviceError, match="shutter time"):
             attempt()
