@@ -148,8 +148,10 @@ def offers_with_frame_size(camera: Camera) -> CameraCapabilities:
     frame_pixels = (raw.width, raw.height)
     if capabilities.frame_pixels is not None and capabilities.frame_pixels != frame_pixels:
         raise ProtocolError(
-            f"the rig file expects frames of {list(capabilities.frame_pixels)} pixels, the camera's "
-            f"have {list(frame_pixels)}; write frame_pixels: {list(frame_pixels)} under 'devices.camera'"
+            f"the rig file expects frames of {list(capabilities.frame_pixels)} pixels, "
+            "the camera's "
+            f"have {list(frame_pixels)}; write frame_pixels: {list(frame_pixels)} "
+            "under 'devices.camera'"
         )
     return replace(capabilities, frame_pixels=frame_pixels)
 

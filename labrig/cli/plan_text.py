@@ -78,7 +78,8 @@ def summary(recording: "Recording", free_bytes: int) -> list[str]:
         *(f"            {line}" for line in recording.protocol.frame_spacing(plan.capabilities)),
         f"  disk      about {size_text(size.total_bytes)}, {size_text(free_bytes)} are free",
         f"            frames {size_text(size.frames_bytes)} "
-        f"({size_text(plan.capabilities.frame_bytes)} each), results {size_text(size.results_bytes)}",
+        f"({size_text(plan.capabilities.frame_bytes)} each), "
+        f"results {size_text(size.results_bytes)}",
         *(_deed("network", sentence, "") for sentence in calls(rig.addresses())),
         *_at_end(rig.on_finish),
     ]

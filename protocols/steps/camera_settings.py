@@ -55,7 +55,8 @@ def longest_exposure_s(
         exposing = f"an exposure of {duration_text(wanted_s)}" if wanted_s else "any exposure"
         raise ProtocolError(
             f"frames every {duration_text(every_s)} leave no time for {exposing}: from its end to "
-            f"the next one this camera takes {duration_text(capabilities.overhead_s)} (frame_time), "
+            f"the next one this camera takes {duration_text(capabilities.overhead_s)} "
+            "(frame_time), "
             f"and {duration_text(spent_s)} where settings change; let frames begin at least "
             f"{shortest_text} apart (every: {shortest_text})"
         )

@@ -352,7 +352,8 @@ def warnings_about(
     elif diagnostics.noise_dof < MIN_FLICKER_DOF:
         warnings.append(
             f"flicker was estimated from {max(diagnostics.noise_dof, 1):.0f} frames' worth of "
-            "bright signal: give a flicker measured elsewhere, or record more frames while it is bright"
+            "bright signal: give a flicker measured elsewhere, or record more "
+            "frames while it is bright"
         )
     if joint.least_squares.creeps:
         warnings.append(
