@@ -90,7 +90,7 @@ def _in_last_report(pattern: str, runs: Path) -> str:
 
 
 def _shipped(kind: str, name: str) -> dict[str, Any]:
-    content: dict[str, Any] = yaml.safe_load((resources.folder(kind) / f"{name}.yaml").read_text())
+    content: dict[str, Any] = yaml.safe_load(resources.find(kind, kind, name).read_text())
     return content
 
 

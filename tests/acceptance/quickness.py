@@ -115,7 +115,7 @@ def record(labrig: Labrig, protocol: str, rig: str, protocol_changes: Mapping[st
         ("protocols", protocol, protocol_changes),
         ("config", rig, {}),
     ):
-        content = yaml.safe_load((labrig.shipped(kind) / f"{name}.yaml").read_text())
+        content = yaml.safe_load(next(labrig.shipped(kind).rglob(f"{name}.yaml")).read_text())
         if kind == "config":
             # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
             content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
