@@ -46,6 +46,7 @@ def list_protocols() -> None:
 
     from labrig.acquire import read_protocol
     from labrig.foundation import plugins, resources
+    from labrig.foundation.errors import UsageError
 
     table = Table(box=None, pad_edge=False)
     for title in ("file", "protocol", "measures"):
@@ -57,7 +58,10 @@ def list_protocols() -> None:
         table.add_row(path.stem, model.protocol, _summary(read_text(path)))
     for name in plugins.names(plugins.MEASUREMENTS):
         if name not in shipped:
-            described = plugins.measurement(name).load("protocol").__doc__ or ""
+            try:
+                described = plugins.measurement(name).load("protocol").__doc__ or ""
+            except UsageError as error:
+                described = str(error)
             table.add_row("–", name, described.strip().partition("\n")[0])
     Console().print(table)
 

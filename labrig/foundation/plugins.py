@@ -5,6 +5,7 @@ registers a measurement in `labrig.measurements`.
 """
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
@@ -133,13 +134,12 @@ def measurement(name: str, source: str = "protocols") -> Measurement:
 def measurements() -> Iterator[tuple[str, Measurement]]:
     """Yield all measurements with their names, sorted.
 
-    Raises
-    ------
-    UsageError
-        A registration cannot be imported.
+    One of a package that cannot be imported is left out, so that all others go on; whoever names it
+    is told by `measurement`.
     """
     for name in names(MEASUREMENTS):
-        yield name, measurement(name)
+        with suppress(UsageError):
+            yield name, measurement(name)
 
 
 def names(group: str) -> list[str]:

@@ -2,10 +2,12 @@
 
 import subprocess
 import sys
+from importlib.metadata import EntryPoint
 
 import pytest
 
 from labrig.acquire import ProtocolModel, read_protocol
+from labrig.foundation import plugins
 from labrig.foundation.errors import UsageError
 from labrig.foundation.plugins import Measurement, measurement, measurements
 from labrig.results import RunResult
@@ -69,3 +71,13 @@ def test_a_part_that_cannot_be_imported_is_one_line(registered: Measurement) -> 
     with pytest.raises(UsageError, match="cannot be imported") as caught:
         registered.load("result")
     assert "\n" not in str(caught.value)
+
+
+def test_a_package_that_is_broken_stops_no_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    registry = plugins._registry()
+    broken = EntryPoint("broken", "no_such_package:BROKEN", plugins.MEASUREMENTS)
+    registered = {**registry[plugins.MEASUREMENTS], "broken": broken}
+    monkeypatch.setattr(plugins, "_registry", lambda: registry | {plugins.MEASUREMENTS: registered})
+    assert [name for name, _ in measurements()] == NAMES
+    with pytest.raises(UsageError, match=r"'broken' .* cannot be imported"):
+        measurement("broken")
