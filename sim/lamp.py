@@ -343,12 +343,12 @@ class Mercury:
 
     @property
     def on(self) -> bool:
-        """Whether there is an arc."""
+        """True while there is an arc."""
         return self.switches[-1][1]
 
     @property
     def was_on(self) -> bool:
-        """Whether there has ever been an arc."""
+        """True if there has ever been an arc."""
         return len(self.switches) > 1
 
     def switched(self, on: bool, at_s: float) -> "Mercury":

@@ -69,7 +69,7 @@ class CommandedRelay(Switch):
 
 
 class CommandedPositions(Positions):
-    """What a board brings into place, one command for each position."""
+    """Things that a board brings into place, by one command for each position."""
 
     class Settings(FrozenModel):
         """Keys of a part that moves.

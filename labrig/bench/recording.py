@@ -23,11 +23,9 @@ from labrig.bench.run_log import run_log
 from labrig.bench_optics import require_optics
 from labrig.calibration import REFERENCE_KIND
 from labrig.foundation.errors import DiskError, ProtocolError, UsageError
+from labrig.foundation.plugins import bench_check
 from labrig.foundation.yaml_file import yaml_text
 from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
-
-#: Protocol that compares a bench with its calibration.
-CHECK = "calibration_check"
 
 
 @dataclass(frozen=True)
@@ -96,14 +94,15 @@ class Recording:
             "--optics"
             for name in self.protocol.unmeasured(self.rig)
         )
+        check = bench_check()
         unchecked = (
             "nothing in this run compares the bench with that calibration: labrig run "
-            "calibration_check does",
+            f"{check} does",
         )
         reference = self.found.kept.get(REFERENCE_KIND.name)
         has_picture = reference is not None and reference.reference.picture is not None
         is_unchecked = has_picture and not any(
-            CHECK in (unit.rpartition("/")[0], self.protocol.protocol) for unit in self.plan.units
+            check in (unit.rpartition("/")[0], self.protocol.protocol) for unit in self.plan.units
         )
         return (
             *self.found.notes,

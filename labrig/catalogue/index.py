@@ -209,7 +209,7 @@ class RunFilter:
             raise UsageError(f"--status {self.status}: {did_you_mean(self.status, STATUSES)}")
 
     def admits(self, run: RunSummary) -> bool:
-        """Whether the filter admits `run`; a run without attempts passes no limits on the day."""
+        """True if the filter admits `run`; a run without attempts passes no limits on the day."""
         day = None if run.began is None else run.began.date()
         unbounded = (self.since, self.until) == (date.min, date.max)
         return (

@@ -104,7 +104,7 @@ def show_curves(
         Path | None, typer.Option("--picture", help="File for a figure (.png, .svg, .pdf).")
     ] = None,
 ) -> None:
-    """What is in a file of measured curves, and how they look."""
+    """Description and drawing of measured curves in a file."""
     from labrig.optics import read_checked_curves
     from labrig.report import describe_curves, draw_curves
 

@@ -1,6 +1,6 @@
 """`labrig process`: from a recorded run to its result."""
 
-from collections.abc import Iterable
+from functools import cache
 from inspect import Parameter, Signature
 from itertools import pairwise
 from pathlib import Path
@@ -34,7 +34,7 @@ class ProcessCommand(TyperCommand):
         if models is None:
             loaded = (registered.load("options") for _, registered in measurements())
             models = [model for model in loaded if model is not None]
-        return [*super().get_params(ctx), *_options(models)]
+        return [*super().get_params(ctx), *_options(tuple(models))]
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Show its own options and, if a run is named, those of its measurements."""
@@ -62,13 +62,14 @@ def _options_of_run(words: tuple[str, ...]) -> "list[type[ProcessOptions]]":
     return []
 
 
-def _options(models: "Iterable[type[ProcessOptions]]") -> list[Any]:
+@cache
+def _options(models: "tuple[type[ProcessOptions], ...]") -> tuple[Any, ...]:
     """Return one option for each field, by its name; fields of one name are one option."""
     from labrig.analyse import flag
 
     fields = {name: field for model in models for name, field in model.model_fields.items()}
     if not fields:
-        return []
+        return ()
 
     def take(**given: Any) -> None:
         """Take no options by itself: those of the signature below."""
@@ -89,7 +90,7 @@ def _options(models: "Iterable[type[ProcessOptions]]") -> list[Any]:
     take.__annotations__ = {each.name: each.annotation for each in parameters}
     app = typer.Typer(add_completion=False)
     app.command()(take)
-    options = list(typer.main.get_command(app).params)
+    options = tuple(typer.main.get_command(app).params)
     for option in options:
         option.expose_value, option.callback = False, _keep
     return options

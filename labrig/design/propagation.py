@@ -214,7 +214,7 @@ WIDEST = 1.0
 
 
 class SpreadWish(FrozenModel):
-    """How far materials reach around the dots whose own they are.
+    """Reach of materials around the dots whose own they are.
 
     Attributes
     ----------

@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
-from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any, Literal
@@ -108,10 +107,10 @@ class Measurement:
     @property
     def folder(self) -> Path:
         """Folder of the package, with its protocol files."""
-        spec = find_spec(self.package)
-        if spec is None or not spec.submodule_search_locations:
+        module = resolve_name(self.package)
+        if not hasattr(module, "__path__"):
             raise UsageError(f"{self.package}: expected a package, a folder with an __init__.py")
-        return Path(next(iter(spec.submodule_search_locations))).resolve()
+        return Path(next(iter(module.__path__))).resolve()
 
     @property
     def example(self) -> Path:
@@ -140,6 +139,11 @@ def measurements() -> Iterator[tuple[str, Measurement]]:
     for name in names(MEASUREMENTS):
         with suppress(UsageError):
             yield name, measurement(name)
+
+
+def bench_check() -> str:
+    """Return the name of the measurement that checks a calibrated bench."""
+    return next(name for name, registered in measurements() if registered.is_bench_check)
 
 
 def names(group: str) -> list[str]:

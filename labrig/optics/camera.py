@@ -55,7 +55,7 @@ class ShippedCamera:
     path: Path
 
     def is_called(self, camera: str) -> bool:
-        """Whether that is how the camera calls itself, with or without its maker."""
+        """True if the camera calls itself so, with or without its maker."""
         maker, asked = _words(self.maker), _words(camera)
         models = {_key(_words(model)) for model in (self.model, *OTHER_NAMES.get(self.model, ()))}
         while asked[: len(maker)] == maker:

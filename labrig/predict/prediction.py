@@ -46,12 +46,12 @@ class Remedy:
 
     @property
     def helps(self) -> bool:
-        """Whether the change reduces σ noticeably."""
+        """True if the change reduces σ noticeably."""
         return self.gain <= HELPS
 
     @property
     def halves(self) -> bool:
-        """Whether the change halves σ."""
+        """True if the change halves σ."""
         return self.gain <= HALF
 
 

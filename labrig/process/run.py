@@ -312,8 +312,8 @@ def _render(result: RunResult, source: Source) -> Rendered:
 
 def _unfinished_warnings(run: RunRecord, protocol: ProtocolModel) -> tuple[str, ...]:
     """Return a warning of the units that an unfinished run lacks."""
-    units = [unit.name for unit in protocol.units()]
-    if not (missing := [name for name in units if name not in run.completed()]):
+    units, completed = [unit.name for unit in protocol.units()], run.completed()
+    if not (missing := [name for name in units if name not in completed]):
         return ()
     return (
         f"the run is not finished: {len(missing)} of {len(units)} units are missing, from "

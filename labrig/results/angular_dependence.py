@@ -44,7 +44,7 @@ class DependenceTest:
 
     @property
     def finds_dependence(self) -> bool:
-        """Whether a dependence is found at the test's level."""
+        """True if the dependence is significant at the test's level."""
         return self.p < self.level
 
 

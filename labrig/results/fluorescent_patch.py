@@ -35,7 +35,7 @@ class ReradiatedSpectrum:
 
 @dataclass(frozen=True, eq=False)
 class ReradiationUnderLight:
-    """What a sample re-radiates under one narrow-band light, by each method.
+    """Re-radiation of a sample under one narrow-band light, by each method.
 
     Attributes
     ----------

@@ -48,7 +48,7 @@ class LivePictures:
             return self._latest
 
     def wait_until_wanted(self, at_most_s: float) -> bool:
-        """Whether a browser waits for a picture, now or within `at_most_s` seconds of real time."""
+        """True if a browser waits for a picture, now or within `at_most_s` seconds of real time."""
         with self._changed:
             return self._changed.wait_for(lambda: self._is_wanted, at_most_s)
 

@@ -1,4 +1,4 @@
-"""What the page asks and is answered: wishes in the words of their file, designs as numbers.
+"""Requests of the page and their answers: wishes in the words of their file, designs as numbers.
 
 Within a light the times of a timeline lie the denser the shorter it has been on, since a glow
 changes most right after the light does: one second after five minutes of light can be reached as

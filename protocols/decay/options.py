@@ -7,7 +7,7 @@ from labrig.results import AUTO, require_law
 
 
 class DecayOptions(StatesOption, RateOption, IntervalsOption):
-    """How a decay is fitted."""
+    """Options of the fit of a decay."""
 
     law: str = Field(AUTO, description="Law of decay, as of 'labrig fit decay'.")
 

@@ -11,7 +11,7 @@ FREE = "free"
 
 
 class ExcitationOptions(StatesOption, IntervalsOption):
-    """How excitation rates are fitted."""
+    """Options of the fit of excitation rates."""
 
     order: str = Field(
         AUTO,

@@ -7,7 +7,7 @@ from labrig.results import EstimateMethod
 
 
 class LedFluorescenceOptions(ProcessOptions):
-    """How re-radiation is estimated."""
+    """Options of the estimate of re-radiation."""
 
     method: EstimateMethod | None = Field(
         None,

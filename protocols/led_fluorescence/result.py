@@ -66,7 +66,7 @@ class LedFluorescenceResult(RunResult):
 
     @property
     def is_lamp(self) -> BoolArray:
-        """Whether a light is a broadband lamp, which has no wavelength of its own, shape (m,)."""
+        """True for broadband lamps, which have no wavelength of their own, shape (m,)."""
         return np.isin(self.leds, self.lamps)
 
     def provides(self) -> Mapping[str, Any]:

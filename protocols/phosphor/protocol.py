@@ -22,7 +22,7 @@ from labrig.acquire import (
 from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, kinds
 from labrig.foundation.errors import ProtocolError
-from labrig.foundation.plugins import measurement, measurements
+from labrig.foundation.plugins import bench_check, measurement
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.protocols.steps.bench_configuration import BenchConfiguration, ConfiguredUnit, in_turn
@@ -137,7 +137,9 @@ class Phosphor(Chain):
         """
         keys = super()._part_keys(content)
         kind = keys.get("protocol")
-        if not self.patches or not isinstance(kind, str) or not measurement(kind).is_per_patch:
+        if not self.patches or not isinstance(kind, str):
+            return keys
+        if not measurement(kind, f"part {keys.get('part', kind)}").is_per_patch:
             return keys
         patches = keys.get("patches")
         if isinstance(patches, dict) and set(map(str, patches)) != set(self.patches):
@@ -198,8 +200,7 @@ class Phosphor(Chain):
         can_be_checked = reference is not None and reference.picture is not None
         is_needed = any(each.needs_checked_bench for each in registered)
         if can_be_checked and is_needed and not any(each.is_bench_check for each in registered):
-            check = next(name for name, each in measurements() if each.is_bench_check)
-            parts.insert(0, {"protocol": check})
+            parts.insert(0, {"protocol": bench_check()})
         return super(Phosphor, self.model_copy(update={"parts": tuple(parts)})).resolved_for(rig)
 
     def _sharing(self, rig: RigFile) -> Literal["shared", "apart"]:

@@ -4,4 +4,4 @@ from labrig.analyse.process_options import RateOption, StatesOption
 
 
 class SaturationOptions(StatesOption, RateOption):
-    """How the decays are fitted."""
+    """Options of the fits of all decays."""

@@ -79,7 +79,6 @@ def ladder(
     longest_s: float,
     capabilities: CameraCapabilities,
     until_s: float = 0.0,
-    later: Sequence[float] = LATER,
 ) -> list[tuple[float, float]]:
     """Return begin and shutter time of metering frames, as early one after another as they can be.
 
@@ -94,8 +93,6 @@ def ladder(
     until_s
         Time after lamp off in seconds until which further frames begin, each group of them half as
         late again as the end of the one before; 0 for the first frames alone.
-    later
-        Shutter times of the further frames, as fractions of the longest.
     """
     frames: list[tuple[float, float]] = []
     at_s, fractions = first_s, LADDER
@@ -104,7 +101,7 @@ def ladder(
             exposure_s = capabilities.exposure_at_most(longest_s * fraction)
             frames.append((at_s, exposure_s))
             at_s += exposure_s + capabilities.overhead_s + MARGIN_S
-        at_s, fractions = at_s * 1.5, tuple(later)
+        at_s, fractions = at_s * 1.5, LATER
     return frames
 
 

@@ -18,7 +18,7 @@ class SampleChanger(Places, Protocol):
     """A disk or a slide with samples. Safe state: all of them in the dark, none in place."""
 
     def keeps_dark(self) -> bool:
-        """Whether samples that are not in place lie in the dark while another one is lit."""
+        """True if samples that are not in place lie in the dark while another one is lit."""
 
 
 class PlannedSampleChanger(PlannedPlaces):
@@ -58,7 +58,7 @@ class BoardSampleChanger(BoardPlaces):
     }
 
     def keeps_dark(self) -> bool:
-        """Whether samples that are not in place lie in the dark while another one is lit."""
+        """True if samples that are not in place lie in the dark while another one is lit."""
         keeps_dark: bool = self.settings.keeps_dark
         return keeps_dark
 

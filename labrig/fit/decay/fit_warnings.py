@@ -78,7 +78,7 @@ class Bend:
 
     @property
     def is_evident(self) -> bool:
-        """Whether there is one that matters, and nothing else changes the channels' ratios."""
+        """True if there is one that matters, and nothing else changes the channels' ratios."""
         is_significant = abs(self.at_brightest) > BEND_SIGMAS * self.sigma
         explains = chdtrc(max(self.dof, 1), self.rest_chi2) > MISFIT_LEVEL
         return bool(is_significant and explains and self.effect_sigmas > MATTERS_SIGMAS)

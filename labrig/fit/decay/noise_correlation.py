@@ -107,7 +107,7 @@ class NoiseLikelihood:
 
     @property
     def is_known(self) -> bool:
-        """Whether the noise was given."""
+        """True if the noise was given."""
         return self.data.series.sigma_given and len(self.factors) == 1
 
 

@@ -281,7 +281,7 @@ class LawTest(NamedTuple):
 
     @property
     def fails(self) -> bool:
-        """Whether charges of different lengths do not follow the rate equation."""
+        """True if charges of different lengths do not follow the rate equation."""
         return abs(self.trend) > CLEAR_SIGMAS or self.probability < UNLIKELY
 
 

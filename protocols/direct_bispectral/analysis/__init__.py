@@ -1,4 +1,4 @@
-"""From readings of white and samples under narrow-band lights to columns of a matrix.
+"""Columns of a matrix, from readings of white and samples under narrow-band lights.
 
 A pixel's own scatter over a few repetitions says little, but the noise of all pixels of all
 readings of a run follows one law: read noise, dark current, and shot noise of the light. What all

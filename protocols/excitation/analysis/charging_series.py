@@ -1,4 +1,4 @@
-"""From a run's frames to charging series of even sites: every charge and the photographs after it.
+"""Charging series of even sites, from a run's frames: every charge and the photographs after it.
 
 A slice of the strip consists of whole pixels, and some of a colour filter array's colours lie in
 every other column only: a channel's mean belongs to a place up to a pixel beside the site's middle,

@@ -46,7 +46,7 @@ class Connection:
 
     @property
     def is_sending(self) -> bool:
-        """Whether packets still wait to be sent."""
+        """True while packets wait to be sent."""
         return bool(self._outgoing)
 
     def receive(self) -> bool:

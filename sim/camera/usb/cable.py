@@ -30,7 +30,7 @@ class AutoPowerOff:
 
     @property
     def is_off(self) -> bool:
-        """Whether the camera is off; only a person can switch it on again."""
+        """True if the camera is off; only a person can switch it on again."""
         idle_since_s = max(self._spoken_to_s, self._exposing_until_s())
         return 0 < self._after_s < self._clock.now() - idle_since_s
 
