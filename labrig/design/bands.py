@@ -31,8 +31,6 @@ from labrig.optics import CIE_1931, Spectrum, band_integrals, band_means, illumi
 PRIMARIES_NM = np.arange(390.0, 721.0, 5.0)
 #: Weight of the colour over that of smoothness.
 COLOUR_WEIGHT = 1e4
-#: Error of a colour, relative to its luminance, up to which a spectrum is said to have it.
-SAME_COLOUR = 2e-3
 
 XYZ_OF_RGB = np.array(
     [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
