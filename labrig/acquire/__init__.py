@@ -2,6 +2,7 @@
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
+from labrig.acquire.adaptation import Adaptation, Offer, adapted
 from labrig.acquire.channels import (
     Board,
     Channel,
@@ -53,6 +54,7 @@ __all__ = [
     "SERVICES",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
+    "Adaptation",
     "Board",
     "CalibrationRules",
     "CameraCapabilities",
@@ -67,6 +69,7 @@ __all__ = [
     "LateAction",
     "LuminanceReading",
     "ManualStep",
+    "Offer",
     "Optics",
     "PartUnit",
     "Plan",
@@ -87,6 +90,7 @@ __all__ = [
     "TimedAction",
     "UndoManualStep",
     "Unit",
+    "adapted",
     "at",
     "bank_lights",
     "changes_with_absolute_paths",

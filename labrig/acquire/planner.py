@@ -193,7 +193,12 @@ def plan(
     units, unit_ends_s = protocol.units(), []
     for unit in units:
         recorder.unit = unit.name
-        unit.run(Session(bench, recorder, recorder))
+        try:
+            unit.run(Session(bench, recorder, recorder))
+        except ProtocolError as error:
+            if (part := unit.name.rpartition("/")[0]) and unit.name not in str(error):
+                error.args = (f"part {part}: {error}",)
+            raise
         unit_ends_s.append(clock.now())
     return Plan(
         tuple(recorder.steps),

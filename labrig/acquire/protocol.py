@@ -7,6 +7,8 @@ from typing import Annotated, Any, ClassVar, Protocol, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from labrig.acquire.adaptation import Adaptation, adapted
+from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.acquire.values import CameraCapabilities
@@ -180,6 +182,25 @@ class ProtocolModel(FrozenModel):
             If the rig file names a file or folder that does not exist.
         """
         return self
+
+    def adapted_to(
+        self, rig: Rig, chosen: Collection[str] | None = None
+    ) -> tuple[Self, Sequence[Adaptation]]:
+        """Return the protocol with all values that nobody chose among those of a rig; and which.
+
+        Parameters
+        ----------
+        rig
+            Open devices, or stand-ins of a plan.
+        chosen
+            Dotted keys whose values a person chose; None: those that the protocol's file sets.
+
+        Raises
+        ------
+        ProtocolError
+            The rig does not offer a value that was chosen.
+        """
+        return adapted(self, rig, chosen)
 
     def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
         """Return how repeated frames are spaced in time, in lines for a plan; mostly none."""
