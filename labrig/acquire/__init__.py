@@ -18,6 +18,7 @@ from labrig.acquire.loading import (
     driver_and_settings,
     load_driver,
     read_protocol,
+    require_own_ports,
 )
 from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
@@ -106,6 +107,7 @@ __all__ = [
     "planned_rig",
     "read_protocol",
     "read_rig_file",
+    "require_own_ports",
     "run_units",
     "running_programs",
     "shutter_text",

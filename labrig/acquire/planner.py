@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
-from labrig.acquire.loading import driver_and_settings
+from labrig.acquire.loading import driver_and_settings, require_own_ports
 from labrig.acquire.protocol import ProtocolModel, require_inside
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
@@ -248,6 +248,8 @@ def planned_rig(rig: RigFile, source: str, keys: Collection[str] | None = None) 
         _, settings = driver_and_settings(rig, key, source)
         if stand_in := ROLES[key].planned:
             devices[key] = stand_in(settings, clock)
+    if keys is None:
+        require_own_ports(rig, source)
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
     return Rig(rig.name, clock, devices, warm_up_s)
 

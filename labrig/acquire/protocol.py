@@ -131,6 +131,8 @@ class ProtocolModel(FrozenModel):
 
     #: Kinds of calibrations on which the results depend.
     requires: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
+    #: Keys of `optics:` without whose curves a run is recorded, and cannot be processed.
+    curves: ClassVar[tuple[str, ...]] = ()
     #: Whether calibrations that are kept beside the runs are used; not by what measures them anew.
     uses_calibrations: ClassVar[bool] = True
 
@@ -209,6 +211,23 @@ class ProtocolModel(FrozenModel):
     def notes(self, rig: RigFile) -> Sequence[str]:
         """Return what a person should know of this protocol on a rig before a run, a line each."""
         return ()
+
+    def unnamed_curves(self, rig: RigFile) -> Mapping[str, Sequence[str]]:
+        """Return the curves that the results need and the rig file does not name.
+
+        Those of colour filters that are shipped are invented ones, for simulated rigs.
+
+        Returns
+        -------
+        dict of str to sequence of str
+            Protocols that need a curve, by its key under `optics:`.
+        """
+        return {
+            key: (self.protocol,)
+            for key in self.curves
+            if getattr(rig.optics, key) is None
+            and not (key == "filters" and rig.simulation is not None)
+        }
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols whose results this one needs and the rig file does not name."""

@@ -30,6 +30,22 @@ from labrig.foundation.plugins import bench_check
 from labrig.foundation.yaml_file import yaml_text
 from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
 
+#: Consequence of the lack of a curve, by its key under `optics:`.
+_CURVES = {
+    "lamp": (
+        "the rig file names no spectrum of the lamp ('lamp' under 'optics:'): {parts} can only be "
+        "recorded, and processed once it does"
+    ),
+    "grey_card": (
+        "the rig file names no reflectance of the grey card ('grey_card' under 'optics:'): {parts} "
+        "can only be recorded, and processed once it does"
+    ),
+    "filters": (
+        "the rig file names no colour filters ('filters' under 'optics:', a folder with their "
+        "curves): {parts} asks for the shipped ones, which are invented; name yours before the run"
+    ),
+}
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -113,11 +129,16 @@ class Recording:
         is_unchecked = has_picture and not any(
             check in (unit.rpartition("/")[0], self.protocol.protocol) for unit in self.plan.units
         )
+        uncurved = (
+            _CURVES[key].format(parts=", ".join(parts))
+            for key, parts in self.protocol.unnamed_curves(self.rig).items()
+        )
         return (
             *(f"adapted to this rig: {each}" for each in self.adaptations),
             *self.found.notes,
             *(unchecked if is_unchecked else ()),
             *unmeasured,
+            *uncurved,
             *self.protocol.notes(self.rig),
         )
 

@@ -86,6 +86,8 @@ class DirectBispectral(ProtocolModel):
         spectrum.
     """
 
+    curves = ("grey_card",)
+
     protocol: Literal["direct_bispectral"] = "direct_bispectral"
     leds: Annotated[LedNames, AllLeds()] = LED_NAMES
     filters: LedNames | None = None

@@ -105,6 +105,8 @@ class Fade(ConfiguredProtocol):
         Edges of the wavelength bands in nm, rising.
     """
 
+    curves = ("lamp",)
+
     protocol: Literal["fade"] = "fade"
     camera: CameraSettings = CameraSettings(iso=400, f_number=4.0)
     every: DurationS = Field(0.03, gt=0)

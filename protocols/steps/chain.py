@@ -138,6 +138,14 @@ class Chain(ProtocolModel):
             for text in (f"{', '.join(names)}: {first}", *others)
         ]
 
+    def unnamed_curves(self, rig: RigFile) -> Mapping[str, Sequence[str]]:
+        """Return the curves that any part needs and the rig file does not name, with the parts."""
+        needed: dict[str, list[str]] = {}
+        for part in self._links():
+            for key in part.protocol.unnamed_curves(rig):
+                needed.setdefault(key, []).append(part.name)
+        return needed
+
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols that neither the rig file names nor an earlier part measures."""
         measured: set[str] = set()

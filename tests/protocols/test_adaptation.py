@@ -163,3 +163,19 @@ def test_a_plan_shows_the_exposure_that_is_taken(
     exact = prepared(tmp_path, rig_file(), "decay", exposure="1 s")
     lines = exact.protocol.frame_spacing(exact.plan.capabilities)
     assert not any("asked" in line for line in lines)
+
+
+def test_a_chain_says_which_curves_it_lacks_and_what_a_calibration_would_save(
+    tmp_path: Path, rig_file: Callable[..., Path]
+) -> None:
+    notes = prepared(tmp_path, rig_file(), "phosphor").notes()
+    assert any("no spectrum of the lamp" in n and "fade, irradiance" in n for n in notes)
+    assert any("no reflectance of the grey card" in note for note in notes)
+    assert any("no colour filters" in n and "lvf_calibration asks" in n for n in notes)
+    assert any("5 h 9 min and 66 steps by hand" in note for note in notes)
+    (tmp_path / "filters").mkdir()
+    (tmp_path / "filters" / "red.csv").write_text("wavelength_nm,value\n400,0\n700,1\n", "utf-8")
+    curves = "optics:\n  lamp: halogen_3000k\n  grey_card: grey_card_18\n  filters: ./filters"
+    rig = rig_file(("optics:", curves))
+    notes = prepared(tmp_path, rig, "irradiance").notes()
+    assert not any("names no" in note and "under 'optics:'" in note for note in notes)

@@ -4,7 +4,7 @@ LEDs are narrow bands of light that charge the sample; under broadband lamps, th
 seen as in daily life. Both are one kind of device under two keys of a rig file.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -203,6 +203,14 @@ class SwitchedLights(BoardDevice):
             for name, head_nm, peak_nm in self._wavelengths_nm()
             if abs(head_nm - peak_nm) > NOTABLE_NM
         ] or read_back_findings(list(self._switches.values()))
+
+    @classmethod
+    def outlets(cls, address: str, settings: Any) -> list[tuple[str, Hashable]]:
+        """Return what each light occupies: the address of its board, and what of it."""
+        return [
+            (light.address or address, cls.channel_class.outlet(light))
+            for light in settings.channels.values()
+        ]
 
     def channels(self) -> tuple[str, ...]:
         """Return the names of the lights, in the rig file's order."""
