@@ -13,6 +13,7 @@ from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import ROLES
 from labrig.acquire.roles.board_device import BoardDevice
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import PROTOCOL, require_kind
 from labrig.foundation.named_files import with_absolute_paths
 from labrig.foundation.plugins import DRIVERS, MEASUREMENTS, load, measurement, names
 from labrig.foundation.yaml_file import read_yaml, validate
@@ -224,6 +225,7 @@ def read_protocol(
     ['dark', 'meter', 'decay-1']
     """
     path = Path(path)
+    require_kind(path, PROTOCOL)
     content = read_yaml(path)
     model = _model(content, str(path))
     content = with_absolute_paths(content, model, path.resolve().parent)
