@@ -133,8 +133,8 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
 
 @app.command("compare")
 def compare(
-    a: Run,
-    b: Run,
+    run: Run,
+    other: Run,
     runs: Runs = Path("runs"),
     reference: Annotated[
         str | None,
@@ -147,7 +147,7 @@ def compare(
 
     from labrig.catalogue import compare_runs, find_run
 
-    comparison = compare_runs(find_run(a, runs), find_run(b, runs), reference)
+    comparison = compare_runs(find_run(run, runs), find_run(other, runs), reference)
     if json:
         patches = [
             {**asdict(patch), "assessment": patch.assessment} for patch in comparison.patches
