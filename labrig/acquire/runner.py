@@ -224,7 +224,7 @@ class _Recorder:
             direction = "ahead" if step_s > 0 else "back"
             text = f"set {direction} by {duration_text(abs(step_s))}"
             self.acted(PC_CLOCK, text, now_s, now_s, 0.0)
-            self._observer.warn(CLOCK_STEPPED.format(text))
+            self._observer.warn(CLOCK_STEPPED.format(stepped=text))
 
     def take_back(self) -> None:
         """Record that the unit of the last manual step no longer counts, and abort this attempt."""

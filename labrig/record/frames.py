@@ -111,8 +111,8 @@ PERSON, UNDONE = "person", "taken back"
 #: Device of a step of the PC's time of day, and the warning of one.
 PC_CLOCK = "clock of the PC"
 CLOCK_STEPPED = (
-    "the clock of this PC was {}: times of day in this run go on by the clock as it was before, "
-    "durations are right"
+    "the clock of this PC was {stepped}: times of day in this run go on by the clock as it was "
+    "before, durations are right"
 )
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from labrig.foundation.number_format import plus_minus
+from labrig.foundation.result_warning import ResultWarning
 from labrig.results.run_result import RunResult
 
 #: Fewest decimals of a rounded value; a larger σ is written with a power of ten.
@@ -296,7 +297,7 @@ def field_unit(name: str) -> str:
 
 def _members(value: Any) -> list[tuple[str, Any]] | None:
     """Return the named values in a value; None for a plain one."""
-    if isinstance(value, Measured):
+    if isinstance(value, Measured | ResultWarning):
         return None
     if isinstance(value, BaseModel):
         return [(name, getattr(value, name)) for name in type(value).model_fields]

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from labrig.acquire import DARK, LAMP, LEDS
-from labrig.analyse.frames import left_out_lines
+from labrig.analyse.frames import left_out_warnings
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
 from labrig.foundation.errors import DataError
@@ -146,7 +146,7 @@ def _without_stray_light(
     charge: Mapping[FrameRecord, ChargeInterval], blank: BlankFile
 ) -> tuple[dict[FrameRecord, ChargeInterval], tuple[str, ...]]:
     after_s = {frame: frame.start_time - interval.off_s for frame, interval in charge.items()}
-    left_out = left_out_lines(list(after_s.values()), blank)
+    left_out = left_out_warnings(list(after_s.values()), blank)
     return {frame: charge[frame] for frame, t in after_s.items() if blank.is_clean(t)}, left_out
 
 
