@@ -172,7 +172,8 @@ class _Values(Formatter):
         if isinstance(value, tuple | list):
             return ", ".join(self.format_field(each, format_spec) for each in value)
         if format_spec.endswith(ROUNDED):
-            return rounded(float(value), int(format_spec.removesuffix(ROUNDED)))
+            digits = int(format_spec.removesuffix(ROUNDED))
+            return "∞" if value == math.inf else rounded(float(value), digits)
         return str(super().format_field(value, format_spec))
 
 

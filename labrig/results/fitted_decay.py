@@ -228,7 +228,7 @@ class FittedDecay:
         Covariance of the `covariance_parameters`; channel weights and the other channels' offsets
         marginalised.
     warnings
-        Limits of the fit and remedies, a line each.
+        Limits of the fit and remedies.
     candidates
         Fits with each number of states that was tried.
     law
