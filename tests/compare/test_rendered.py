@@ -17,7 +17,7 @@ from labrig.calibration import FADE_KIND
 from labrig.cli.exit_codes import guarded
 from labrig.compare.glow import glow_sigma, state_signals
 from labrig.compare.photographed_room import PhotographedRoom
-from labrig.compare.rendered import charging_doubts
+from labrig.compare.rendered import charging_warnings
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
 from labrig.material import (
@@ -226,16 +226,16 @@ def test_what_a_run_warns_of_its_charging_is_said_of_the_rendering() -> None:
     right = replace(left, fit=replace(left.fit, warnings=()))
     both = replace(excited, patches={"left": law, "right": right})
     chain = PhosphorResult(parts={"excitation": both}, failed={}, materials={})
-    assert list(charging_doubts(chain, ["left", "right"])) == [
+    assert list(charging_warnings(chain, ["left", "right"])) == [
         "left, excitation: another law holds"
     ]
     # A material that was named takes the place of the run's own.
-    assert not list(charging_doubts(chain, ["right"]))
+    assert not list(charging_warnings(chain, ["right"]))
     alone = PhosphorResult(
         parts={"excitation": replace(excited, patches={"": law})}, failed={}, materials={}
     )
-    assert list(charging_doubts(alone, ["otor"])) == ["excitation: another law holds"]
-    assert not list(charging_doubts(alone, []))
+    assert list(charging_warnings(alone, ["otor"])) == ["excitation: another law holds"]
+    assert not list(charging_warnings(alone, []))
 
 
 def test_the_lamps_fade_is_the_measured_one(measured: Path) -> None:
