@@ -313,9 +313,9 @@ def _low_warnings(series: Series, low: LowStart | None) -> list[ResultWarning]:
     return [
         Disturbance(
             "first-values-low",
-            "the first values ({values}, the last at {until_s:.12g} s) lie below the law of the "
-            "others, by {sigmas:.0f} σ: was the detector saturated, or the lamp not off yet? Leave "
-            "them out, if they are wrong, with '--from {next_time}'",
+            "the first {values} value(s), until {until_s:.12g} s, lie below the law of the others, "
+            "by {sigmas:.0f} σ: was the detector saturated, or the lamp not off yet? Leave out the "
+            "wrong ones with '--from {next_time}'",
             values=low.number,
             until_s=_clock_s(series, last_s),
             sigmas=low.sigmas,
