@@ -81,9 +81,9 @@ def test_a_first_value_that_is_too_low_is_named_and_kept(tmp_path: Path) -> None
     values = np.exp(-0.03 * t_s) + 0.003 * np.random.default_rng(1).normal(size=60)
     values[0] = 0.94
     fit = fitted(tmp_path, t_s, values, states=1, origin="-10")
-    values = of_code(fit.warnings, "first-values-low").values
-    assert (values["values"], values["until_s"]) == (1, 0.5)
-    assert values["next_time"].startswith("3.03")
+    warned = of_code(fit.warnings, "first-values-low").values
+    assert (warned["values"], warned["until_s"]) == (1, 0.5)
+    assert warned["next_time"].startswith("3.03")
     assert len(fit.residuals) == 60
 
 
