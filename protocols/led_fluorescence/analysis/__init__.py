@@ -36,6 +36,7 @@ from labrig.fit.fluorescence import (
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.material import appearance, read_emissions
 from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
 from labrig.protocols.led_fluorescence.analysis.methods import (
@@ -160,7 +161,7 @@ class _Lit:
     cards: Mapping[str, LitPatch]
     samples: Mapping[str, LitPatch]
     has_first: bool
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
 
 def _lit(
@@ -185,14 +186,17 @@ def _lit(
     if len(leds.by_row) < 2:
         raise DataError(
             f"expected two LEDs or more that can be used, got {len(leds.by_row)}: "
-            f"{'; '.join(leds.left_out)}"
+            f"{'; '.join(map(str, leds.left_out))}"
         )
-    warnings = [*leds.warnings, *lamps.warnings]
+    warnings: list[ResultWarning] = [*leds.warnings, *lamps.warnings]
     if context.rig.optics.may_see_gloss:
         warnings.append(
-            f"at {context.rig.optics.geometry_text} a surface's gloss reaches the "
-            "camera, and is in "
-            "the reflectance: light from 45°, or cross polarisers"
+            Disturbance(
+                "gloss-in-reflectance",
+                "at {geometry} a surface's gloss reaches the camera, and is in the reflectance: "
+                "light from 45°, or cross polarisers",
+                geometry=context.rig.optics.geometry_text,
+            )
         )
     kind: LightKind = "light" if context.protocol.lamps else "LED"
     for what, patches in (("card", cards), ("samples", samples)):
