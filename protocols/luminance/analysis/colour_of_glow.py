@@ -110,7 +110,7 @@ class ColourScale:
     doubt: ResultWarning | None
 
     def card_doubt(self, card: FloatArray, sigma: float) -> ResultWarning | None:
-        """Return a warning if the card's light is not that of the lamp; None if it is as expected."""
+        """Return a warning if the card's light is not that of the lamp, None if it is."""
         if not self.has_ratios:
             return None
         logs = np.log(card / self.expected_card)
