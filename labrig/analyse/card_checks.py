@@ -376,7 +376,7 @@ def _odd(led: str, other: str | None, pair: str | None, kind: LightKind) -> Unus
             kind=kind,
         )
     elif pair is not None:
-        reason = Contradiction(
+        reason = Disturbance(
             "two-lights",
             "left out, the card has the colour of two {kind}s, {other} is lit, too; check their "
             "relays",

@@ -27,7 +27,13 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.foundation.number_format import plus_minus as plus_minus
-from labrig.foundation.result_warning import Disturbance, ResultWarning, Undetermined, Unmeasured
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    ResultWarning,
+    Undetermined,
+    Unmeasured,
+)
 from labrig.optics import SpectrometerReading, Spectrum, Transmittance, read_spectrometer_reading
 from labrig.protocols.direct_bispectral.analysis.checks import (
     ambient_light,
@@ -400,7 +406,7 @@ def _usable_whites(
             warnings.append(other)
         elif too_near := [kept for kept in usable if _distance_nm(usable[kept], white) < APART_NM]:
             warnings.append(
-                Disturbance(
+                Contradiction(
                     "light-is-another",
                     "has the same spectrum as {other}; left out: is it connected to another output "
                     "than the rig file says?",

@@ -363,7 +363,7 @@ class _Calibration:
             )
         loose = [name for name, known in brightness.items() if known is None and name not in unseen]
         if loose:
-            yield Undetermined(
+            yield Unmeasured(
                 "light-unscaled",
                 "the brightness of {leds} stays unknown: no value of the camera determines it; a "
                 "spectrometer would",

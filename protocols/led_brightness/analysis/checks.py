@@ -269,7 +269,7 @@ def _check_spectra(checked: Checked, bank: Bank, spectra: Mapping[str, Spectrome
         elif is_led and rms_nm <= _rms_nm(bank.nominal[nearest]) * WINGS + BIN_NM / 2:
             checked.left_out.add(name)
             checked.warnings.append(
-                Contradiction(
+                Disturbance(
                     "two-lights",
                     "under LED '{led}' there is {part:.0%} as much light about {centre_nm:.0f} nm: "
                     "LED '{other}' was lit at the same time; '{led}' is left out, check the "
@@ -372,7 +372,7 @@ def _check_channels(
                 leds=(name, other),
             )
         elif match.pair is not None:
-            warning = Contradiction(
+            warning = Disturbance(
                 "two-lights",
                 "under LED '{led}' the camera's channels see '{other}', too: two were lit at the "
                 "same time; '{led}' is left out, check the outputs",
