@@ -1,7 +1,7 @@
 """Checks of lights by what card and samples show, and what to know before a matrix is used."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -114,50 +114,88 @@ def per_led_warnings(name: str, fit: FluorescenceFit) -> Iterator[ResultWarning]
 
 
 def fact_warnings(
-    name: str, fit: FluorescenceFit, channels: Sequence[str]
+    fits: Mapping[str, FluorescenceFit], input_nm: FloatArray, channels: Sequence[str]
 ) -> Iterator[ResultWarning]:
-    """Yield a warning for each fact of an estimate."""
-    for fact in fit.facts:
-        match fact:
-            case ExtrapolatedExcitation(input_nm, share):
-                yield Extrapolated(
-                    "excitation-extrapolated",
-                    "{share:.0%} of the re-radiation under equal light is excited between "
-                    "{from_nm:g} nm and {to_nm:g} nm where no LED shone: it is extrapolated",
-                    subject=name,
-                    share=share,
-                    from_nm=min(input_nm),
-                    to_nm=max(input_nm),
-                )
-            case UnknownBrightness(lights):
-                yield Unmeasured(
-                    "light-unscaled",
-                    "the brightness of {lights} was not measured: the colour of the light that "
-                    "they excite is determined, its amount is not; measure them with "
-                    "led_brightness",
-                    subject=name,
-                    lights=tuple(lights),
-                )
-            case UnexplainedValues(reduced_chi2, light, channel, sigmas):
-                yield Misfit(
-                    "matrix-misfit",
-                    "no matrix explains the values (reduced χ² {reduced_chi2:.1f}); under {light} "
-                    "channel {channel} is {most_sigmas:.1f} σ off",
-                    subject=name,
-                    reduced_chi2=reduced_chi2,
-                    light=light,
-                    channel=channels[channel],
-                    most_sigmas=sigmas,
-                )
-            case MoreThanWhite(input_nm, fraction, sigma):
-                yield Contradiction(
-                    "more-than-white",
-                    "{fraction.plus_minus} of the light of {input_nm:g} nm comes back, more than "
-                    "from a perfect white",
-                    subject=name,
-                    fraction=Measured(fraction, sigma),
-                    input_nm=input_nm,
-                )
+    """Yield warnings for the facts of estimates; of one that samples share, one for all.
+
+    Parameters
+    ----------
+    fits
+        Estimate of each sample.
+    input_nm
+        Middles of the input bands in nm, rising.
+    channels
+        Names of the camera's channels.
+    """
+    extrapolated: dict[str, ExtrapolatedExcitation] = {}
+    samples_of: dict[tuple[str, ...], list[str]] = {}
+    for name, fit in fits.items():
+        for fact in fit.facts:
+            if isinstance(fact, ExtrapolatedExcitation):
+                extrapolated[name] = fact
+            elif isinstance(fact, UnknownBrightness):
+                samples_of.setdefault(fact.lights, []).append(name)
+            else:
+                yield _fact_warning(name, fact, channels)
+    if extrapolated:
+        dark_nm = {nm for fact in extrapolated.values() for nm in fact.input_nm}
+        yield Extrapolated(
+            "excitation-extrapolated",
+            "of the re-radiation under equal light {shares} is excited at {gaps_nm} nm, where no "
+            "LED shone: that part is extrapolated",
+            shares=tuple(f"{fact.share:.0%} ({name})" for name, fact in extrapolated.items()),
+            gaps_nm=_gaps_nm(dark_nm, input_nm),
+            share={name: fact.share for name, fact in extrapolated.items()},
+        )
+    for lights, samples in samples_of.items():
+        yield Unmeasured(
+            "light-unscaled",
+            "the brightness of {lights} was not measured: the colour of the light that they "
+            "excite is determined, its amount is not; measure them with led_brightness",
+            subject=", ".join(samples),
+            lights=lights,
+        )
+
+
+def _gaps_nm(dark_nm: Collection[float], input_nm: FloatArray) -> tuple[str, ...]:
+    """Return the ranges of neighbouring bands that no light reached."""
+    gaps: list[list[float]] = []
+    is_open = False
+    for nm in input_nm.tolist():
+        if nm not in dark_nm:
+            is_open = False
+        elif is_open:
+            gaps[-1][1] = nm
+        else:
+            gaps.append([nm, nm])
+            is_open = True
+    return tuple(f"{low:g}" if low == high else f"{low:g} to {high:g}" for low, high in gaps)
+
+
+def _fact_warning(
+    name: str, fact: UnexplainedValues | MoreThanWhite, channels: Sequence[str]
+) -> ResultWarning:
+    match fact:
+        case UnexplainedValues(reduced_chi2, light, channel, sigmas):
+            return Misfit(
+                "matrix-misfit",
+                "no matrix explains the values (reduced χ² {reduced_chi2:.1f}); under {light} "
+                "channel {channel} is {most_sigmas:.1f} σ off",
+                subject=name,
+                reduced_chi2=reduced_chi2,
+                light=light,
+                channel=channels[channel],
+                most_sigmas=sigmas,
+            )
+        case MoreThanWhite(input_nm, fraction, sigma):
+            return Contradiction(
+                "more-than-white",
+                "{fraction.plus_minus} of the light of {input_nm:g} nm comes back, more than "
+                "from a perfect white",
+                subject=name,
+                fraction=Measured(fraction, sigma),
+                input_nm=input_nm,
+            )
 
 
 #: Part of the brightest LED's signal from which the camera is expected to see an LED.

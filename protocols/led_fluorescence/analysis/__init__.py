@@ -107,7 +107,7 @@ def analyse(context: AnalysisContext) -> LedFluorescenceResult:
     direct = direct_measurement(context.rig)
     if direct is not None:
         warnings += missing_samples(direct, lit.samples)
-    patches = {}
+    patches, chosen = {}, {}
     for number, (name, sample) in enumerate(lit.samples.items()):
         even = sample.times(*_evenness(lit.cards[name], card, system))
         estimates = _Estimates(
@@ -116,11 +116,12 @@ def analyse(context: AnalysisContext) -> LedFluorescenceResult:
             method,
         )
         patches[name] = _patch(estimates, even, system, direct)
-        warnings += fact_warnings(name, estimates.chosen, camera.channels)
+        chosen[name] = estimates.chosen
         if method == "per-led":
             warnings += per_led_warnings(name, estimates.chosen)
         if lit.has_first:
             warnings += bleaching_warnings(name, even.bleaching)
+    warnings += fact_warnings(chosen, system.input_nm, camera.channels)
     return LedFluorescenceResult(
         leds=lit.used,
         led_peak_nm=lit.peak_nm,
