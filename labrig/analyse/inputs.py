@@ -13,6 +13,7 @@ from labrig.bench_optics import calibration
 from labrig.calibration import CalibrationKind, kinds
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.plugins import measurement
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.material import Material
 from labrig.record import RunRecord
 from labrig.results import EmissionSpectrum, FittedDecay, RunResult
@@ -142,7 +143,7 @@ class AnalysedParts:
     results: Mapping[str, RunResult]
     failed: Mapping[str, str]
     inputs: Mapping[str, Inputs]
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
 
 def analyse_parts(context: AnalysisContext) -> AnalysedParts:
@@ -159,7 +160,7 @@ def analyse_parts(context: AnalysisContext) -> AnalysedParts:
     """
     results: dict[str, RunResult] = {}
     failures: dict[str, DataError | FitError] = {}
-    warnings: list[str] = []
+    warnings: list[ResultWarning] = []
     inputs = {"": context.inputs}
     for link in context.protocol.chain():
         kind = link.protocol.protocol
@@ -179,10 +180,12 @@ def analyse_parts(context: AnalysisContext) -> AnalysedParts:
                 raise FitError("; ".join(result.failures()))
         except (DataError, FitError) as error:
             failures[link.name] = error
-            warnings.append(f"{link.name}: {error}")
+            warnings.append(
+                Unmeasured("part-failed", "{reason}", subject=link.name, reason=str(error))
+            )
             continue
         results[link.name] = result
-        warnings += [f"{link.name}: {warning}" for warning in result.warnings]
+        warnings += [warning.about(link.name) for warning in result.warnings]
         inputs[link.sample] = known.updated_by(result)
     if not results:
         raise next(iter(failures.values()))

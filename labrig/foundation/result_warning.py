@@ -44,6 +44,9 @@ class ResultWarning:
     ----------
     sentence
         The sentence with its values.
+    values
+        The values as in JSON: numbers and texts, tuples of these, and a mapping with value, sigma
+        and unit of a quantity with σ.
 
     Examples
     --------
@@ -61,13 +64,14 @@ class ResultWarning:
     code: str
     sentence: str
     subject: str
-    values: Mapping[str, Any] = field(hash=False, compare=False)
+    values: Mapping[str, Any] = field(hash=False)
 
     def __init__(self, code: str, sentence: str, /, subject: str = "", **values: Any) -> None:
         object.__setattr__(self, "code", code)
         object.__setattr__(self, "sentence", _FORMATTER.vformat(sentence, (), values))
         object.__setattr__(self, "subject", subject)
-        object.__setattr__(self, "values", values)
+        plain = {name: _plain(value) for name, value in values.items()}
+        object.__setattr__(self, "values", plain)
 
     def about(self, subject: str) -> Self:
         """Return the warning with a subject before its own; unchanged for an empty one."""
@@ -86,9 +90,9 @@ class ResultWarning:
             "code": self.code,
             "subject": self.subject,
             "sentence": self.sentence,
-            "values": {name: _plain(value) for name, value in self.values.items()},
+            "values": dict(self.values),
         }
-        return {name: value for name, value in content.items() if value}
+        return {name: value for name, value in content.items() if value or name == "sentence"}
 
     @staticmethod
     def of(content: Any) -> "ResultWarning":
@@ -183,9 +187,11 @@ _FORMATTER = _Values()
 def _plain(value: Any) -> Any:
     """Return a value as JSON has it: a quantity by value, σ and unit; no number is infinite."""
     if is_dataclass(value):
-        return {name: _plain(each) for name, each in vars(value).items() if each != ""}
+        value = vars(value)
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
     if isinstance(value, tuple | list):
-        return [_plain(each) for each in value]
+        return tuple(_plain(each) for each in value)
     if isinstance(value, str | bool) or value is None:
         return value
     number = value if isinstance(value, int) else float(value)

@@ -23,7 +23,6 @@ from labrig.foundation.errors import DiskError, FitError, UsageError
 from labrig.foundation.output_file import make_folder_in
 from labrig.foundation.plugins import measurement
 from labrig.foundation.result_warning import (
-    Disturbance,
     ResultWarning,
     Unmeasured,
     warning_lines,
@@ -35,10 +34,10 @@ from labrig.process.provenance import PROVENANCE, Provenance, describe_run, prov
 from labrig.process.result_changes import changes
 from labrig.process.verification import require_as_sealed
 from labrig.record import (
-    CLOCK_STEPPED,
     PC_CLOCK,
     RunLock,
     RunRecord,
+    clock_stepped,
     read_run,
     require_plain_folder,
 )
@@ -336,7 +335,7 @@ def _unfinished_warnings(run: RunRecord, protocol: ProtocolModel) -> tuple[Resul
 def _clock_step_warnings(run: RunRecord) -> tuple[ResultWarning, ...]:
     """Return a warning of each step of the PC's clock during the completed units of a run."""
     return tuple(
-        Disturbance("pc-clock-stepped", CLOCK_STEPPED, stepped=f"{action.action} in {attempt.unit}")
+        clock_stepped(f"{action.action} in {attempt.unit}")
         for attempt in run.completed().values()
         for action in attempt.actions
         if action.device == PC_CLOCK
