@@ -48,7 +48,7 @@ def trap_depths(
     >>> from pathlib import Path
     >>> from labrig.catalogue import trap_depths
     >>> fast, slow = trap_depths([Path("runs/decay"), Path("runs/decay")], [15, 25])
-    >>> fast.depth.warnings[0].code, str(fast.depth.warnings[0].values["depth"])
+    >>> fast.depth.warnings[0].code, str(fast.depth.depth_ev)
     ('rates-not-thermal', '0.000(16) eV')
     """
     if temperatures_c is None:

@@ -38,8 +38,7 @@ def is_bent(fit: DecayFit) -> bool:
 
 def bend_of(fit: DecayFit) -> Measured:
     """Return the deviation at the brightest in % that the only warning of a bend has."""
-    deviation: Measured = of_code(fit.warnings, "sensor-nonlinear").values["deviation"]
-    return deviation
+    return Measured(**of_code(fit.warnings, "sensor-nonlinear").values["deviation"])
 
 
 def test_there_is_no_warning_without_a_bend() -> None:

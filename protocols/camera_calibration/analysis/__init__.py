@@ -307,7 +307,7 @@ def _warnings(
         )
         bent_levels = [level for level, d, s in curve if abs(d) > max(BENT, CLEAR_SIGMAS * s)]
         if bent_levels:
-            yield Contradiction(
+            yield Disturbance(
                 "sensor-nonlinear",
                 "the sensor is off a straight line by more than 1 % at {level_dn:.0f} DN above "
                 "dark: keep the brightest level of a measurement well below",

@@ -29,7 +29,6 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.result_warning import (
     Contradiction,
-    Extrapolated,
     Misfit,
     ResultWarning,
     Unmeasured,
@@ -322,7 +321,7 @@ def _light_warnings(fit: FittedExcitation) -> Iterator[ResultWarning]:
 
 def _layer_warnings(fit: FittedExcitation) -> Iterator[ResultWarning]:
     if fit.layer is not None and fit.layer.is_shown:
-        yield Extrapolated(
+        yield Misfit(
             "layer-thick",
             "the charges are those of a layer, not a surface: {effect}; measure a thinner one",
             effect=str(fit.layer),
