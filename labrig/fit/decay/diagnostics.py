@@ -314,8 +314,8 @@ def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> li
         return [
             Undetermined(
                 "sigma-upper-bound",
-                "the values lie {factor:2r} times closer to the fit than σ says: their scatter is "
-                "below what the curve resolves against which σ was measured, and every σ given "
+                "the values lie {factor:2r} times closer to the fit than σ implies: their scatter "
+                "is below what the curve resolves against which σ was measured, and every σ given "
                 "here is an upper bound; give the values' σ if you have it",
                 factor=factor,
             )
@@ -323,9 +323,9 @@ def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> li
     return [
         Contradiction(
             "sigma-too-large",
-            "the values lie {factor:2r} times closer to the fit than σ says: σ is too large, and "
-            "with it every σ given here, or it is another quantity; check its column and its unit, "
-            "or leave it out, and it is taken from the scatter",
+            "the values lie {factor:2r} times closer to the fit than σ implies: σ is too large, "
+            "and with it every σ given here, or it is another quantity; check its column and its "
+            "unit, or leave it out, and it is taken from the scatter",
             factor=factor,
         )
     ]

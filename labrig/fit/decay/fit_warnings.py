@@ -365,7 +365,7 @@ def warnings_about(
         warnings.append(
             Contradiction(
                 "sigma-rescaled",
-                "the values scatter {factor:2r} times as much as their σ says, and it was "
+                "the values scatter {factor:2r} times as much as their σ implies, and it was "
                 "multiplied by that: check its column and its unit",
                 factor=diagnostics.sigma_scale.factor,
             )

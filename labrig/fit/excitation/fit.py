@@ -581,18 +581,20 @@ def _law_warnings(problem: ExcitationProblem, theta: FloatArray) -> list[ResultW
         return [
             Misfit(
                 "rate-equation-misfit",
-                "long charges glow more and short ones less than by the rate equation ({trend:.1f} "
-                "σ of the lamp's scatter): charging is convex, the layer is thick, or another law "
-                "holds; k_e, Λ and r(0) are not to be trusted",
+                "long charges glow more and short ones less than by the rate equation "
+                "({sigmas:.1f} σ of the lamp's scatter): charging is convex, the layer is thick, "
+                "or another law holds; k_e, Λ and r(0) are not to be trusted",
+                sigmas=abs(test.trend),
                 trend=test.trend,
             )
         ]
     return [
         Misfit(
             "rate-equation-misfit",
-            "long charges glow less and short ones more than by the rate equation ({trend:.1f} σ "
+            "long charges glow less and short ones more than by the rate equation ({sigmas:.1f} σ "
             "of the lamp's scatter): states are missing, the lamp's light empties traps, or "
             "another law holds; k_e, Λ and r(0) are not to be trusted",
+            sigmas=abs(test.trend),
             trend=test.trend,
         )
     ]
