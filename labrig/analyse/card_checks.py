@@ -405,6 +405,7 @@ def _is_rather(match: ChannelMatch, led: str, named: str) -> bool:
 
 
 def _odd(led: str, other: str | None, pair: str | None, kind: LightKind) -> UnusedLed:
+    reason: ResultWarning
     if other is not None:
         reason = Contradiction(
             "light-is-another",

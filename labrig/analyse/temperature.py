@@ -61,7 +61,8 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[Result
                 "no-temperature", "the thermometer gave no reading: {remedy}", remedy=CHECK_IT
             ),
         )
-    course, warnings = TemperatureHistory(run), []
+    course = TemperatureHistory(run)
+    warnings: list[ResultWarning] = []
     for part, group in groupby(photographs, key=lambda frame: frame.unit.rpartition("/")[0]):
         temperatures_c = course.during(list(group))
         if temperatures_c.size and np.ptp(temperatures_c) >= MOVED_K:

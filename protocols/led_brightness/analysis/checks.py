@@ -360,6 +360,7 @@ def _check_channels(
     for name, match in odd.items():
         if name in checked.without_camera:
             continue
+        warning: ResultWarning
         checked.left_out.add(name)
         other = swapped.get(name)
         if other is not None:
