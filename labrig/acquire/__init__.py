@@ -18,7 +18,8 @@ from labrig.acquire.loading import (
     load_driver,
     read_protocol,
 )
-from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
+from labrig.acquire.plan_clock import Due, PlanClock, step_text
+from labrig.acquire.planner import MAX_STEPS, Continuation, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
@@ -58,7 +59,9 @@ __all__ = [
     "CameraCapabilities",
     "Channel",
     "Connections",
+    "Continuation",
     "DeviceEntry",
+    "Due",
     "ExposureSettings",
     "Finding",
     "Frame",
@@ -70,6 +73,7 @@ __all__ = [
     "Optics",
     "PartUnit",
     "Plan",
+    "PlanClock",
     "Positions",
     "Program",
     "ProtocolModel",
@@ -105,5 +109,6 @@ __all__ = [
     "run_units",
     "running_programs",
     "shutter_text",
+    "step_text",
 ]
 __all__ += roles.__all__

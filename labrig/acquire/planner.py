@@ -3,8 +3,10 @@
 import json
 import math
 import zlib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
+from statistics import median
 from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
@@ -20,7 +22,14 @@ from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
-from labrig.record import PERSON, ActionRecord, FrameRecord, RunSize, SpectrumRecord
+from labrig.record import (
+    PERSON,
+    ActionRecord,
+    FrameRecord,
+    RunRecord,
+    RunSize,
+    SpectrumRecord,
+)
 
 
 @dataclass(frozen=True)
@@ -80,6 +89,14 @@ class Plan:
         """Lab time of the whole run in seconds."""
         return self.unit_ends_s[-1] if self.unit_ends_s else 0.0
 
+    def ends_s(self, unit: str) -> float:
+        """Return the end of a unit in seconds after the start of the run."""
+        return self.unit_ends_s[self.units.index(unit)]
+
+    def begins_s(self, unit: str) -> float:
+        """Return the begin of a unit in seconds after the start of the run."""
+        return (0.0, *self.unit_ends_s)[self.units.index(unit)]
+
     @property
     def frames(self) -> int:
         """Number of frames."""
@@ -129,6 +146,39 @@ class Plan:
         return json.dumps(content, ensure_ascii=False)
 
 
+@dataclass(frozen=True)
+class Continuation:
+    """Place at which a run that was begun before goes on.
+
+    Attributes
+    ----------
+    record
+        Record of the run up to now.
+    connected_time
+        Time at which the devices were connected, in seconds since 1970: they warm up from then on.
+    time
+        Time at which the run goes on, in seconds since 1970.
+    """
+
+    record: RunRecord
+    connected_time: float
+    time: float
+
+    def frame_time_s(self, declared_s: float) -> float:
+        """Return the time from a frame's end to the next one's begin, as frames have shown it.
+
+        Where none has, it is what the driver declares, which is the longest.
+        """
+        gaps_s = [
+            after.start_time - before.end_time
+            for attempt in self.record.attempts
+            for before, after in pairwise(attempt.frames)
+        ]
+        # Longer ones waited for something else.
+        at_once_s = [gap_s for gap_s in gaps_s if 0.0 < gap_s <= declared_s]
+        return median(at_once_s) if at_once_s else declared_s
+
+
 #: Largest number of steps: more than any run has, and laid out in about a second.
 MAX_STEPS = 50_000
 
@@ -140,6 +190,7 @@ def plan(
     rig: RigFile,
     source: str,
     capabilities: CameraCapabilities | None = None,
+    continuation: Continuation | None = None,
 ) -> Plan:
     """Lay out a protocol on the devices of a rig without opening any of them.
 
@@ -156,6 +207,10 @@ def plan(
         Name or path of the rig file, for messages.
     capabilities
         Settings that the connected camera offers; None for those that the rig file declares.
+    continuation
+        Place at which a run goes on: only units that it lacks are laid out, with the warm-up that
+        devices need from their connection on, and frames as fast as they were. None for a whole
+        run.
 
     Returns
     -------
@@ -191,6 +246,16 @@ def plan(
         require_inside(protocol.named_regions(), capabilities.frame_pixels)
     recorder = _PlanRecorder(clock, capabilities.overhead_s)
     units, unit_ends_s = protocol.units(), []
+    if continuation is not None:
+        completed = continuation.record.completed()
+        units = [unit for unit in units if unit.name not in completed]
+        recorder.done = [a for attempt in continuation.record.attempts for a in attempt.actions]
+        recorder.seeds = continuation.record.seeds()
+        clock.epoch_s = continuation.time
+        bench.connected_s = continuation.connected_time - continuation.time
+        if CAMERA in bench:
+            frame_time_s = continuation.frame_time_s(capabilities.overhead_s)
+            bench.devices[CAMERA.key] = PlannedCamera(clock, capabilities, frame_time_s)
     for unit in units:
         recorder.unit = unit.name
         unit.run(Session(bench, recorder, recorder))
@@ -256,6 +321,7 @@ class _PlanRecorder:
     unit: str = ""
     steps: list[Step] = field(default_factory=list)
     done: list[ActionRecord] = field(default_factory=list)
+    seeds: Mapping[str, int] = field(default_factory=dict)
 
     def acted(
         self,
@@ -305,7 +371,7 @@ class _PlanRecorder:
         return when_planned
 
     def seed(self) -> int:
-        return zlib.crc32(self.unit.encode())
+        return self.seeds.get(self.unit, zlib.crc32(self.unit.encode()))
 
     def doing(self, what: str, until_s: float | None = None) -> None:
         if until_s is not None:

@@ -1,7 +1,6 @@
 """The runner: performs the units of a protocol and records them in the run folder."""
 
 import logging
-import uuid
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
@@ -25,6 +24,7 @@ from labrig.record import (
     RunFolder,
     SpectrumRecord,
     TemperatureRecord,
+    seed_of,
 )
 
 T = TypeVar("T")
@@ -138,14 +138,13 @@ def _run_remaining_units(
     actions = [action for attempt in completed.values() for action in attempt.actions]
     # Of failed attempts, too: what moved or shone then did so all the same.
     all_actions = [action for attempt in record.attempts for action in attempt.actions]
-    lights = LightReadback(rig)
+    lights, seeds = LightReadback(rig), record.seeds()
     for number, unit in enumerate(units, start=1):
         if unit.name in completed:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        attempts = [attempt.uid for attempt in record.attempts if attempt.unit == unit.name]
-        seed = _seed(attempts[0] if attempts else writer.uid)
+        seed = seeds.get(unit.name, seed_of(writer.uid))
         recorder = _Recorder(
             rig.clock, writer, frames, spectra, actions, all_actions, observer, seed
         )
@@ -162,11 +161,6 @@ def _run_remaining_units(
         writer.stop("success")
         frames, spectra = recorder.kept_frames, recorder.kept_spectra
         actions = recorder.kept_actions
-
-
-def _seed(uid: str) -> int:
-    """Return a seed of random numbers, which follows from the uid of a unit's first attempt."""
-    return uuid.UUID(uid).int % 2**32
 
 
 class _Recorder:

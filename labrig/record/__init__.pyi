@@ -61,4 +61,5 @@ from .run_record import (
     Attempt as Attempt,
     RunRecord as RunRecord,
     read_run as read_run,
+    seed_of as seed_of,
 )

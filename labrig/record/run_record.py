@@ -2,6 +2,8 @@
 
 import os
 import re
+import uuid
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -61,6 +63,8 @@ class Attempt:
         Reason of the RunStop.
     frames, actions, temperatures, spectra
         Records of the attempt.
+    stop_time
+        Time of the RunStop in seconds since 1970; None where there is none.
     """
 
     uid: str
@@ -72,6 +76,7 @@ class Attempt:
     actions: list[ActionRecord] = field(default_factory=list)
     temperatures: list[TemperatureRecord] = field(default_factory=list)
     spectra: list[SpectrumRecord] = field(default_factory=list)
+    stop_time: float | None = None
 
     @property
     def files(self) -> list[FileRecord]:
@@ -135,6 +140,14 @@ class RunRecord:
                 completed[attempt.unit] = attempt
         return completed
 
+    def seeds(self) -> dict[str, int]:
+        """Return the seed of the random numbers of each unit that was attempted."""
+        seeds: dict[str, int] = {}
+        for attempt in self.attempts:
+            with suppress(ValueError):  # somebody else wrote this uid
+                seeds.setdefault(attempt.unit, seed_of(attempt.uid))
+        return seeds
+
     def part(self, name: str) -> "RunRecord":
         """Return the completed units of one part of a chain, by their names within the part."""
         attempts = [_attempt_within(name, attempt) for attempt in self.completed().values()]
@@ -171,6 +184,28 @@ class RunRecord:
         """Return all readings of the thermometer in order of time, including failed attempts."""
         readings = [reading for attempt in self.attempts for reading in attempt.temperatures]
         return sorted(readings, key=lambda reading: reading.time)
+
+
+def seed_of(uid: str) -> int:
+    """Return a seed of random numbers, which follows from the uid of a unit's first attempt.
+
+    Parameters
+    ----------
+    uid
+        Uid of the RunStart.
+
+    Returns
+    -------
+    int
+        Seed of 32 bits.
+
+    Examples
+    --------
+    >>> from labrig.record import seed_of
+    >>> seed_of("00000000-0000-0000-0000-00000000002a")
+    42
+    """
+    return uuid.UUID(uid).int % 2**32
 
 
 def _attempt_within(part: str, attempt: Attempt) -> Attempt | None:
@@ -325,7 +360,12 @@ def _close_attempt(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
         "temperatures": len(attempt.temperatures),
     }
     check_stop(doc, counts)
-    return replace(attempt, exit_status=doc["exit_status"], reason=doc.get("reason", ""))
+    return replace(
+        attempt,
+        exit_status=doc["exit_status"],
+        reason=doc.get("reason", ""),
+        stop_time=float(doc["time"]),
+    )
 
 
 def _check_times(record: Recorded) -> Recorded:

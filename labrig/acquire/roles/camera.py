@@ -60,11 +60,28 @@ class Camera(Device, Protocol):
 
 
 class PlannedCamera(PlannedDevice):
-    """Stand-in of a camera in a plan, which takes the time that the driver declares."""
+    """Stand-in of a camera in a plan, which takes the time that the driver declares.
 
-    def __init__(self, clock: VirtualClock, capabilities: CameraCapabilities) -> None:
+    Parameters
+    ----------
+    clock
+        Clock of the plan.
+    capabilities
+        Settings that the camera offers.
+    frame_time_s
+        Time from the end of an exposure until the next can begin, in seconds, where it is known
+        better than the driver declares it.
+    """
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        capabilities: CameraCapabilities,
+        frame_time_s: float | None = None,
+    ) -> None:
         self._clock = clock
         self._offers = capabilities
+        self._frame_time_s = capabilities.overhead_s if frame_time_s is None else frame_time_s
         self._settings: ExposureSettings | None = None
 
     def capabilities(self) -> CameraCapabilities:
@@ -85,7 +102,7 @@ class PlannedCamera(PlannedDevice):
         assert self._settings is not None, "a session configures before it shoots"
         start_s = self._clock.now()
         end_s = start_s + self._settings.exposure_s
-        self._clock.spend(self._settings.exposure_s + self._offers.overhead_s)
+        self._clock.spend(self._settings.exposure_s + self._frame_time_s)
         return Frame(b"", "", start_s, end_s, self._settings)
 
 
