@@ -11,6 +11,7 @@ from labrig.acquire.channels import (
     TemperatureSensor,
 )
 from labrig.acquire.connections import Connections, SerialPort
+from labrig.acquire.continuation import Continuation
 from labrig.acquire.loading import (
     bank_lights,
     changes_with_absolute_paths,
@@ -19,7 +20,7 @@ from labrig.acquire.loading import (
     read_protocol,
 )
 from labrig.acquire.plan_clock import Due, PlanClock, step_text
-from labrig.acquire.planner import MAX_STEPS, Continuation, Plan, Step, plan, planned_rig
+from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back

@@ -95,8 +95,13 @@ class PlanClock:
     def begin_step(self, what: str, now_s: float) -> None:
         """Note that a step begins; one that is not in the plan changes nothing."""
         number = self._find(_key_of_step(what))
-        if number is not None:
-            self._move(number + 1, self.plan.steps[number].at_s, now_s)
+        if number is None:
+            return
+        step = self.plan.steps[number]
+        if self._is_random(step):
+            self._following = number + 1
+        else:
+            self._move(number + 1, step.at_s, now_s)
 
     def begin_wait(self, what: str, now_s: float, until_s: float) -> None:
         """Note that a wait begins, which may be shorter than planned, and when it ends."""
@@ -157,8 +162,16 @@ class PlanClock:
     def _move(self, following: int, at_s: float, now_s: float) -> None:
         """Take a position, from which time goes on until the next step that is no wait."""
         self._following, self._at_s, self._since_s = following, at_s, now_s
-        steps = (step.at_s for step in self.coming() if step.device != WAITING)
+        steps = (
+            step.at_s
+            for step in self.coming()
+            if step.device != WAITING and not self._is_random(step)
+        )
         self._until_s = next(steps, self.plan.ends_s(self._unit))
+
+    def _is_random(self, step: Step) -> bool:
+        """Return whether a step begins at a time that the run draws, which is not the plan's."""
+        return step.device == CAMERA.key and step.unit in self.plan.drawn
 
 
 def step_text(device: str, action: str) -> str:

@@ -3,18 +3,17 @@
 import json
 import math
 import zlib
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import pairwise
-from statistics import median
 from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
+from labrig.acquire.continuation import Continuation, Pace
 from labrig.acquire.loading import driver_and_settings
 from labrig.acquire.protocol import ProtocolModel, require_inside
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
-from labrig.acquire.roles import CAMERA, ROLES, Device
+from labrig.acquire.roles import CAMERA, LAMP, LAMP_ON, ROLES, Device
 from labrig.acquire.roles.camera import PlannedCamera
 from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import CameraCapabilities, Frame
@@ -26,7 +25,6 @@ from labrig.record import (
     PERSON,
     ActionRecord,
     FrameRecord,
-    RunRecord,
     RunSize,
     SpectrumRecord,
 )
@@ -76,6 +74,8 @@ class Plan:
         Settings that the camera offers.
     patches
         Largest number of patches of a unit.
+    drawn
+        Units with frames at random times, which the run draws anew.
     """
 
     steps: tuple[Step, ...]
@@ -83,6 +83,7 @@ class Plan:
     unit_ends_s: tuple[float, ...]
     capabilities: CameraCapabilities
     patches: int = 1
+    drawn: frozenset[str] = frozenset()
 
     @property
     def duration_s(self) -> float:
@@ -144,39 +145,6 @@ class Plan:
             "steps": [asdict(step) for step in self.steps],
         }
         return json.dumps(content, ensure_ascii=False)
-
-
-@dataclass(frozen=True)
-class Continuation:
-    """Place at which a run that was begun before goes on.
-
-    Attributes
-    ----------
-    record
-        Record of the run up to now.
-    connected_time
-        Time at which the devices were connected, in seconds since 1970: they warm up from then on.
-    time
-        Time at which the run goes on, in seconds since 1970.
-    """
-
-    record: RunRecord
-    connected_time: float
-    time: float
-
-    def frame_time_s(self, declared_s: float) -> float:
-        """Return the time from a frame's end to the next one's begin, as frames have shown it.
-
-        Where none has, it is what the driver declares, which is the longest.
-        """
-        gaps_s = [
-            after.start_time - before.end_time
-            for attempt in self.record.attempts
-            for before, after in pairwise(attempt.frames)
-        ]
-        # Longer ones waited for something else.
-        at_once_s = [gap_s for gap_s in gaps_s if 0.0 < gap_s <= declared_s]
-        return median(at_once_s) if at_once_s else declared_s
 
 
 #: Largest number of steps: more than any run has, and laid out in about a second.
@@ -246,19 +214,23 @@ def plan(
         require_inside(protocol.named_regions(), capabilities.frame_pixels)
     recorder = _PlanRecorder(clock, capabilities.overhead_s)
     units, unit_ends_s = protocol.units(), []
+    pace = Pace(capabilities.overhead_s)
     if continuation is not None:
+        pace = continuation.pace(capabilities.overhead_s)
         completed = continuation.record.completed()
         units = [unit for unit in units if unit.name not in completed]
-        recorder.done = [a for attempt in continuation.record.attempts for a in attempt.actions]
-        recorder.seeds = continuation.record.seeds()
+        recorder.follow(continuation)
         clock.epoch_s = continuation.time
         bench.connected_s = continuation.connected_time - continuation.time
         if CAMERA in bench:
-            frame_time_s = continuation.frame_time_s(capabilities.overhead_s)
-            bench.devices[CAMERA.key] = PlannedCamera(clock, capabilities, frame_time_s)
+            bench.devices[CAMERA.key] = PlannedCamera(clock, capabilities, pace)
+        if LAMP in bench and continuation.burns(LAMP.key, str(LAMP_ON)):
+            bench[LAMP].on()
     for unit in units:
         recorder.unit = unit.name
+        clock.spend(pace.reading_s)
         unit.run(Session(bench, recorder, recorder))
+        clock.spend(pace.reading_s)
         unit_ends_s.append(clock.now())
     return Plan(
         tuple(recorder.steps),
@@ -266,6 +238,7 @@ def plan(
         tuple(unit_ends_s),
         capabilities,
         max((len(protocol.patches_of(unit.name)) for unit in units), default=1) or 1,
+        frozenset(recorder.drawn),
     )
 
 
@@ -321,7 +294,18 @@ class _PlanRecorder:
     unit: str = ""
     steps: list[Step] = field(default_factory=list)
     done: list[ActionRecord] = field(default_factory=list)
-    seeds: Mapping[str, int] = field(default_factory=dict)
+    kept: list[ActionRecord] = field(default_factory=list)
+    times: list[tuple[str, str, float]] = field(default_factory=list)
+    drawn: set[str] = field(default_factory=set)
+
+    def follow(self, continuation: Continuation) -> None:
+        """Take over what was recorded before."""
+        self.done, self.kept = continuation.all_actions, continuation.completed_actions
+        self.times = [
+            (frame.role, frame.unit, frame.start_time)
+            for attempt in continuation.record.completed().values()
+            for frame in attempt.frames
+        ]
 
     def acted(
         self,
@@ -334,11 +318,14 @@ class _PlanRecorder:
     ) -> None:
         self._add(Step(start_s, self.unit, device, action), late_s)
         begin, end = self.clock.wall(start_s), self.clock.wall(end_s)
-        self.done.append(ActionRecord(self.unit, device, action, begin, end, late_s, task))
+        record = ActionRecord(self.unit, device, action, begin, end, late_s, task)
+        self.done.append(record)
+        self.kept.append(record)
 
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         action, exposure_s = f"{role} frame, {frame.settings}", frame.settings.exposure_s
         self._add(Step(frame.start_s, self.unit, CAMERA.key, action, exposure_s), late_s)
+        self.times.append((role, self.unit, self.clock.wall(frame.start_s)))
 
     def spectrum(
         self, role: str, reading: SpectrometerReading, start_s: float, end_s: float, late_s: float
@@ -361,8 +348,11 @@ class _PlanRecorder:
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return ()
 
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        return [(unit, time) for its_role, unit, time in self.times if its_role == role]
+
     def actions(self, device: str) -> Sequence[ActionRecord]:
-        return ()
+        return [action for action in self.kept if action.device == device]
 
     def all_actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self.done if action.device == device]
@@ -371,7 +361,8 @@ class _PlanRecorder:
         return when_planned
 
     def seed(self) -> int:
-        return self.seeds.get(self.unit, zlib.crc32(self.unit.encode()))
+        self.drawn.add(self.unit)
+        return zlib.crc32(self.unit.encode())
 
     def doing(self, what: str, until_s: float | None = None) -> None:
         if until_s is not None:

@@ -1,6 +1,7 @@
 """The runner: performs the units of a protocol and records them in the run folder."""
 
 import logging
+import uuid
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
@@ -24,7 +25,6 @@ from labrig.record import (
     RunFolder,
     SpectrumRecord,
     TemperatureRecord,
-    seed_of,
 )
 
 T = TypeVar("T")
@@ -138,13 +138,14 @@ def _run_remaining_units(
     actions = [action for attempt in completed.values() for action in attempt.actions]
     # Of failed attempts, too: what moved or shone then did so all the same.
     all_actions = [action for attempt in record.attempts for action in attempt.actions]
-    lights, seeds = LightReadback(rig), record.seeds()
+    lights = LightReadback(rig)
     for number, unit in enumerate(units, start=1):
         if unit.name in completed:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        seed = seeds.get(unit.name, seed_of(writer.uid))
+        attempts = [attempt.uid for attempt in record.attempts if attempt.unit == unit.name]
+        seed = _seed(attempts[0] if attempts else writer.uid)
         recorder = _Recorder(
             rig.clock, writer, frames, spectra, actions, all_actions, observer, seed
         )
@@ -161,6 +162,11 @@ def _run_remaining_units(
         writer.stop("success")
         frames, spectra = recorder.kept_frames, recorder.kept_spectra
         actions = recorder.kept_actions
+
+
+def _seed(uid: str) -> int:
+    """Return a seed of random numbers, which follows from the uid of a unit's first attempt."""
+    return uuid.UUID(uid).int % 2**32
 
 
 class _Recorder:
@@ -258,6 +264,9 @@ class _Recorder:
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
         return [frame for frame in self.kept_frames if frame.role == role]
+
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        return [(frame.unit, frame.start_time) for frame in self.frames(role)]
 
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return [spectrum for spectrum in self.kept_spectra if spectrum.role == role]

@@ -25,6 +25,7 @@ class ClockedObserver:
         self._plan_clock = plan_clock
         self._clock = clock
         self._lay_out: Callable[[], tuple[Plan, RunRecord]] | None = None
+        self._is_paced = self._has_new_pace = False
 
     def connected(self, lay_out: Callable[[], tuple[Plan, RunRecord]]) -> None:
         """Follow the plan from this connection of the devices on.
@@ -38,9 +39,14 @@ class ClockedObserver:
         self._follow()
 
     def unit(self, name: str, number: int, total: int) -> None:
-        """Note that a unit begins; one that was complete at the connection was taken back."""
-        if name not in self._plan_clock.plan.units:
+        """Note that a unit begins.
+
+        The plan is laid out anew after the first frames, which show how fast devices are, and for a
+        unit that was complete at the connection, and was taken back.
+        """
+        if self._has_new_pace or name not in self._plan_clock.plan.units:
             self._follow()
+            self._has_new_pace = False
         self._plan_clock.begin_unit(name, self._clock.now())
         self._observer.unit(name, number, total)
 
@@ -54,6 +60,8 @@ class ClockedObserver:
 
     def frame(self, record: FrameRecord) -> None:
         """Note that a frame was recorded."""
+        if not self._is_paced:
+            self._is_paced = self._has_new_pace = True
         self._observer.frame(record)
 
     def warn(self, text: str) -> None:

@@ -61,5 +61,4 @@ from .run_record import (
     Attempt as Attempt,
     RunRecord as RunRecord,
     read_run as read_run,
-    seed_of as seed_of,
 )

@@ -2,8 +2,6 @@
 
 import os
 import re
-import uuid
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -140,14 +138,6 @@ class RunRecord:
                 completed[attempt.unit] = attempt
         return completed
 
-    def seeds(self) -> dict[str, int]:
-        """Return the seed of the random numbers of each unit that was attempted."""
-        seeds: dict[str, int] = {}
-        for attempt in self.attempts:
-            with suppress(ValueError):  # somebody else wrote this uid
-                seeds.setdefault(attempt.unit, seed_of(attempt.uid))
-        return seeds
-
     def part(self, name: str) -> "RunRecord":
         """Return the completed units of one part of a chain, by their names within the part."""
         attempts = [_attempt_within(name, attempt) for attempt in self.completed().values()]
@@ -184,28 +174,6 @@ class RunRecord:
         """Return all readings of the thermometer in order of time, including failed attempts."""
         readings = [reading for attempt in self.attempts for reading in attempt.temperatures]
         return sorted(readings, key=lambda reading: reading.time)
-
-
-def seed_of(uid: str) -> int:
-    """Return a seed of random numbers, which follows from the uid of a unit's first attempt.
-
-    Parameters
-    ----------
-    uid
-        Uid of the RunStart.
-
-    Returns
-    -------
-    int
-        Seed of 32 bits.
-
-    Examples
-    --------
-    >>> from labrig.record import seed_of
-    >>> seed_of("00000000-0000-0000-0000-00000000002a")
-    42
-    """
-    return uuid.UUID(uid).int % 2**32
 
 
 def _attempt_within(part: str, attempt: Attempt) -> Attempt | None:

@@ -39,14 +39,14 @@ BETWEEN_UNITS_S = 1.0
 
 @dataclass(frozen=True)
 class Course:
-    """Plan of what is left of a run since its devices were connected last.
+    """Plan of what was left of a run as an attempt began.
 
     Attributes
     ----------
     plan
         Plan of the units that were missing then.
     uid
-        Uid of the attempt with which this connection began.
+        Uid of the attempt.
     """
 
     plan: Plan
@@ -239,21 +239,20 @@ class RunFollower:
         return {"unit": self._plan.units.index(attempt.unit), **course.status_of(attempt)}
 
     def _course_of(self, attempt: Attempt) -> Course:
-        """Return the plan since the connection in which an attempt is made."""
-        attempts = self._record.attempts
-        connected = connected_at(attempts)
-        uid, first = attempts[connected].uid, connected
-        if self._course is not None and self._course.uid == uid:
-            if attempt.unit in self._course.plan.units:
-                return self._course
-            first = attempts.index(attempt)  # its unit was complete then, and was taken back
-        goes_on = Continuation(
-            replace(self._record, attempts=attempts[:first]),
-            connected_time=float(attempts[connected].start["time"]),
-            time=float(attempts[first].start["time"]),
-        )
-        rest = plan(self._protocol, self._rig, str(self.run / "rig.yaml"), continuation=goes_on)
-        self._course = Course(rest, uid)
+        """Return the plan of what is left since the begin of an attempt."""
+        if self._course is None or self._course.uid != attempt.uid:
+            attempts = self._record.attempts
+            before = attempts[: attempts.index(attempt)]
+            connected = attempts[connected_at(attempts)]
+            begun = replace(attempt, frames=[], actions=[])
+            goes_on = Continuation(
+                replace(self._record, attempts=[*before, begun]),
+                connected_time=float(connected.start["time"]),
+                time=float(attempt.start["time"]),
+            )
+            source = str(self.run / "rig.yaml")
+            rest = plan(self._protocol, self._rig, source, continuation=goes_on)
+            self._course = Course(rest, attempt.uid)
         return self._course
 
     def _unit_states(

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from labrig.acquire.continuation import Pace
 from labrig.acquire.roles.role import (
     Device,
     ExerciseContext,
@@ -68,20 +69,20 @@ class PlannedCamera(PlannedDevice):
         Clock of the plan.
     capabilities
         Settings that the camera offers.
-    frame_time_s
-        Time from the end of an exposure until the next can begin, in seconds, where it is known
-        better than the driver declares it.
+    pace
+        Times that frames have taken, which are better known than the driver declares them; None
+        without frames.
     """
 
     def __init__(
         self,
         clock: VirtualClock,
         capabilities: CameraCapabilities,
-        frame_time_s: float | None = None,
+        pace: Pace | None = None,
     ) -> None:
         self._clock = clock
         self._offers = capabilities
-        self._frame_time_s = capabilities.overhead_s if frame_time_s is None else frame_time_s
+        self._pace = pace or Pace(capabilities.overhead_s)
         self._settings: ExposureSettings | None = None
 
     def capabilities(self) -> CameraCapabilities:
@@ -91,6 +92,7 @@ class PlannedCamera(PlannedDevice):
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         """Accept settings that are offered."""
         self._offers.check(settings)
+        self._clock.spend(self._pace.change_s)
         self._settings = settings
         return settings
 
@@ -102,7 +104,7 @@ class PlannedCamera(PlannedDevice):
         assert self._settings is not None, "a session configures before it shoots"
         start_s = self._clock.now()
         end_s = start_s + self._settings.exposure_s
-        self._clock.spend(self._settings.exposure_s + self._frame_time_s)
+        self._clock.spend(self._settings.exposure_s + self._pace.frame_time_s)
         return Frame(b"", "", start_s, end_s, self._settings)
 
 
