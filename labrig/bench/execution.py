@@ -48,7 +48,7 @@ from labrig.foundation.errors import (
 from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
-from labrig.record import ActionRecord, FrameRecord, RunFolder, RunRecord, damaged_frames
+from labrig.record import JOURNAL, ActionRecord, FrameRecord, RunFolder, RunRecord, damaged_frames
 from labrig.reduce import read_exif, read_raw
 
 ANEW = "calibrate the bench with this one (labrig run calibration), or use the other"
@@ -204,7 +204,7 @@ def execute(
         observer = LensObserver(clocked, bench.file)
         for unit in interrupted_units:
             observer.warn(f"the unit {unit} was cut off and is done again")
-        for oddity in _oddities(folder, record):
+        for oddity in [*_oddities(folder, record), *_changes(protocol, record)]:
             observer.warn(oddity)
         if record.last_time > bench.clock.wall() + CLOCK_STEP_S:
             observer.warn(
@@ -466,7 +466,12 @@ def _report_exchanged_camera(
 
 
 def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
-    """Yield warnings about frames of a resumed run that disagree with the journal."""
+    """Yield warnings about the journal of a resumed run, and frames that disagree with it."""
+    if record.torn:
+        yield (
+            f"{folder.path / JOURNAL}: its last line is incomplete, as a crash leaves it, and is "
+            "not used"
+        )
     if unknown := folder.unknown_files():
         yield (
             f"{folder.path / 'frames'}: the journal does not tell of {_listed(unknown)}, which a "
@@ -478,6 +483,23 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
         yield (
             f"{folder.path / 'frames'}: {_listed(texts)}; restore from a copy, or begin a new "
             "run: labrig process refuses them"
+        )
+
+
+def _changes(protocol: ProtocolModel, record: RunRecord) -> Iterator[str]:
+    """Yield warnings about a protocol file that is another than when the run began."""
+    now = {"protocol": protocol.protocol, "sample": protocol.sample.name}
+    for key, value in now.items():
+        if (before := record.began_with(key)) not in ("", value):
+            yield (
+                f"protocol.yaml was changed since the run began: its {key} is '{value}', in the "
+                f"journal it is '{before}'"
+            )
+    units = {unit.name for unit in protocol.units()}
+    if gone := [name for name in record.completed() if name not in units]:
+        yield (
+            f"protocol.yaml was changed since the run began: it no longer has the units "
+            f"{_listed(gone)}, which are complete"
         )
 
 

@@ -22,7 +22,9 @@ from rich.text import Text
 
 from labrig.acquire import ExposureSettings, ManualStep, PlanClock, RunObserver, step_text
 from labrig.bench import logging_to
-from labrig.cli.exit_codes import DetachableStream
+from labrig.cli.detachable_stream import DetachableStream
+from labrig.cli.under_way import hidden_work, work_text
+from labrig.foundation.activity import under_way
 from labrig.foundation.clock import Clock, SystemClock
 from labrig.foundation.errors import UsageError
 from labrig.foundation.quantity import duration_text
@@ -186,7 +188,7 @@ def progress(
         yield PlainProgress(state)
         return
     console = Console(file=cast(TextIO, DetachableStream(sys.stderr)))
-    with Live(console=console, refresh_per_second=4, transient=True) as live:
+    with hidden_work(), Live(console=console, refresh_per_second=4, transient=True) as live:
         observer = LiveProgress(state, live, console)
         try:
             yield observer
@@ -352,6 +354,8 @@ class LiveProgress:
         if state.until_s is not None:
             countdown = f"  ({_countdown(state.until_s - state.clock.now())} to go)"
         table.add_row(_dim("now"), Text(state.doing + countdown, style="bold"))
+        if work := under_way():
+            table.add_row(_dim("computing"), work_text(work, SystemClock().now()))
         table.add_row(_dim("next"), state.next_step())
         if due := state.next_by_hand():
             table.add_row(_dim("by hand"), due.removeprefix("next by hand "))

@@ -10,7 +10,7 @@ import typer
 
 from labrig.cli import default_rig, page
 from labrig.cli.default_rig import RigArgument, rig_path
-from labrig.cli.exit_codes import DetachableStream
+from labrig.cli.detachable_stream import DetachableStream
 from labrig.foundation.errors import DeviceError, ProtocolError
 
 if TYPE_CHECKING:

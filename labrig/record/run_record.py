@@ -124,6 +124,10 @@ class RunRecord:
                 return str(identity)
         return ""
 
+    def began_with(self, key: str) -> str:
+        """Return a text of the first RunStart, such as `protocol`; empty if there is none."""
+        return str(self.attempts[0].start.get(key, "")) if self.attempts else ""
+
     def completed(self) -> dict[str, Attempt]:
         """Return the completed attempt of each unit by the unit's name, in order of completion.
 

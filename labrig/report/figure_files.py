@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from labrig.foundation.activity import counted
 from labrig.foundation.errors import UsageError
 from labrig.foundation.output_file import make_folder, make_folder_in, write_durably, write_text
 from labrig.report.chart import Chart
@@ -209,7 +210,7 @@ def write_figures_pdf(path: Path, title: str, sections: Sequence[Section]) -> in
     metadata = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
     content = BytesIO()
     with figure_style(), PdfPages(content, metadata=metadata) as pdf:
-        for picture in pictures:
+        for picture in counted(pictures, "drawing figures"):
             figure = picture.figure()
             figure.patch.set(visible=True, facecolor="white")
             pdf.savefig(figure)
