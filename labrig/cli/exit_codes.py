@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from labrig.cli.detachable_stream import DetachableStream
 from labrig.cli.under_way import showing_work
+from labrig.foundation.activity import checking
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import (
     DiskError,
@@ -19,7 +20,7 @@ from labrig.foundation.errors import (
     memory_shortage,
 )
 from labrig.foundation.readable_output import spelled
-from labrig.foundation.signals import STOP_SIGNALS, raise_interrupted
+from labrig.foundation.signals import STOP_SIGNALS, await_signals, raise_again
 
 if TYPE_CHECKING:
     from typer.exceptions import TyperException
@@ -81,10 +82,9 @@ def _run(arguments: Sequence[str]) -> int:
             f"{remedy}",
             2,
         )
-    for signum in STOP_SIGNALS:
-        signal.signal(signum, raise_interrupted)
+    await_signals()
     try:
-        with showing_work(arguments):
+        with showing_work(arguments), checking(raise_again):
             command()(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
         return _print_error(str(interrupted), 128 + interrupted.signum)

@@ -1,6 +1,6 @@
 """What long work is at, for whoever shows it: a terminal, or nobody."""
 
-from collections.abc import Iterable, Iterator, Sized
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -45,6 +45,37 @@ class Activity:
 
 #: Work under way, each a part of the one before it.
 _under_way: list[Activity] = []
+#: What is called after each counted step, such as a look for an interruption.
+_checkpoints: list[Callable[[], None]] = []
+
+
+@contextmanager
+def checking(check: Callable[[], None]) -> Iterator[None]:
+    """Call a function after each counted step, so that long work can be interrupted.
+
+    Parameters
+    ----------
+    check
+        Function that raises an exception where the work is to end.
+
+    Yields
+    ------
+    None
+        Nothing; the function is called until the block ends.
+
+    Examples
+    --------
+    >>> from labrig.foundation.activity import checking, counted
+    >>> with checking(lambda: print("go on")):
+    ...     letters = list(counted("ab", "reading letters"))
+    go on
+    go on
+    """
+    _checkpoints.append(check)
+    try:
+        yield
+    finally:
+        _checkpoints.remove(check)
 
 
 def under_way() -> tuple[Activity, ...]:
@@ -124,3 +155,5 @@ def counted(items: Iterable[T], what: str, total: int = 0) -> Iterator[T]:
         for item in items:
             yield item
             work.done += 1
+            for check in _checkpoints:
+                check()
