@@ -35,6 +35,7 @@ from labrig.acquire import (
     in_safe_order,
     load_driver,
     not_opened,
+    require_own_ports,
 )
 from labrig.bench.awake import kept_awake
 from labrig.bench.device_lock import held, network_devices, serial_devices, usb_device
@@ -108,7 +109,7 @@ class Bench:
         DeviceError
             A device is missing, or cannot confirm that it is safe; or the guard cannot be started.
         UsageError
-            Another labrig holds one of the addresses.
+            Another labrig holds one of the addresses, or two devices have one.
         Interrupted
             A stop was requested.
         """
@@ -119,6 +120,7 @@ class Bench:
             stack.enter_context(checking(partial(self.clock.sleep, 0.0)))
             # Entered first, so that ports close after the devices on them are safe.
             transports = stack.enter_context(ExitStack())
+            require_own_ports(self.file, self.source)
             connections = _Connections(self.clock, self.room, transports, self.ports)
             warm_up_s = {key: entry.warm_up for key, entry in self.file.devices.items()}
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
