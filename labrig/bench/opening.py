@@ -16,6 +16,7 @@ from contextlib import (
 )
 from dataclasses import dataclass, field
 from functools import partial
+from mmap import mmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -127,7 +128,7 @@ class Bench:
             stack.callback(rig.disconnect)
             stack.callback(self._make_safe, rig)
             # Freed first, so that lack of memory does not prevent the safe state.
-            stack.callback(bytearray(RESERVE_BYTES).clear)
+            stack.callback(mmap(-1, RESERVE_BYTES).close)
             opened = [key for key in self.file.devices if key not in self.left_out]
             for key in in_safe_order(opened):
                 rig.connect(key, partial(_open, self.file, key, connections, self.source))

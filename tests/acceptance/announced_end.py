@@ -167,7 +167,8 @@ def main() -> None:
 
 def _row(name: str, n_cuts: int, late: Sequence[Sequence[float]]) -> str:
     cells = [
-        f"{min(each):+.1f} to {max(each):+.1f}, {sum(abs(s) < LARGEST_S for s in each)} of {len(each)}"
+        f"{min(each):+.1f} to {max(each):+.1f}, "
+        f"{sum(abs(s) < LARGEST_S for s in each)} of {len(each)}"
         if each
         else "none"
         for each in late
