@@ -71,6 +71,14 @@ def power_of_ten(exponent: int) -> str:
     return "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
+def as_written(number: str) -> str:
+    """Return a formatted number as people write it: `−1.2`, `12 %`, `3 × 10⁻⁷`."""
+    mantissa, e, exponent = number.replace("-", "−").replace("%", " %").partition("e")
+    if not e:
+        return mantissa
+    return f"{mantissa} × {power_of_ten(int(exponent.replace('−', '-')))}"
+
+
 def _exponent(number: float) -> int:
     return math.floor(math.log10(abs(number)))
 
