@@ -265,6 +265,9 @@ class _Recorder:
     def frames(self, role: str) -> Sequence[FrameRecord]:
         return [frame for frame in self.kept_frames if frame.role == role]
 
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        return [(frame.unit, frame.start_time) for frame in self.frames(role)]
+
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return [spectrum for spectrum in self.kept_spectra if spectrum.role == role]
 

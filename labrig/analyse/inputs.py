@@ -11,6 +11,7 @@ from labrig.analyse.overrides import Overrides
 from labrig.analyse.process_options import OptionsT, chosen_options
 from labrig.bench_optics import calibration
 from labrig.calibration import CalibrationKind, kinds
+from labrig.foundation.activity import counted
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.plugins import measurement
 from labrig.foundation.result_warning import ResultWarning, Unmeasured
@@ -162,7 +163,7 @@ def analyse_parts(context: AnalysisContext) -> AnalysedParts:
     failures: dict[str, DataError | FitError] = {}
     warnings: list[ResultWarning] = []
     inputs = {"": context.inputs}
-    for link in context.protocol.chain():
+    for link in counted(context.protocol.chain(), "analysing parts"):
         kind = link.protocol.protocol
         analyse_link = measurement(kind, str(context.run.folder)).load("analysis")
         known = inputs.get(link.sample, inputs[""])

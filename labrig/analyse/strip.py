@@ -14,6 +14,7 @@ import numpy as np
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND
+from labrig.foundation.activity import counted
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region, region_pixels
@@ -236,7 +237,7 @@ def for_each_patch(
     results: dict[str, Found] = {}
     warnings: list[ResultWarning] = []
     failures: list[DataError] = []
-    for patch in patches:
+    for patch in counted(patches, "analysing patches"):
         name = "" if patch.alone else patch.name
         try:
             results[patch.folder], patch_warnings = analyse(patch)

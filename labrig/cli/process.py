@@ -165,9 +165,11 @@ def process(
 
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
     """Process the run in the folder `run` and print its result."""
+    from labrig.foundation.activity import activity
     from labrig.process import process_and_report
 
-    processed = process_and_report(run, overrides)
+    with activity(f"processing {run.name}"):
+        processed = process_and_report(run, overrides)
     if json:
         typer.echo(processed.result.to_json())
         return

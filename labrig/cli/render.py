@@ -1,20 +1,14 @@
 """`labrig render`: measured materials in a scene, over time."""
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TextIO, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labrig.cli.completion import complete_scene
-from labrig.cli.exit_codes import DetachableStream
 from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from labrig.reproduce import RenderFolder, Scene
 
 
@@ -107,6 +101,7 @@ def render(
 
     A rendering that was interrupted goes on when it is started again.
     """
+    from labrig.foundation.activity import activity
     from labrig.foundation.clock import SystemClock
     from labrig.foundation.quantity import duration_text
     from labrig.reproduce import (
@@ -133,64 +128,25 @@ def render(
         typer.echo(f"{done} of {count} pictures are there already", err=True)
     clock = SystemClock()
     begin_s = clock.now()
-    with _bar() as bar:
-        frames = folder.rendered(built, report=bar.report)
+    with activity("rendering") as work:
+
+        def report(what: str, part: float) -> None:
+            if what != work.what:
+                work.restart(what, 100)
+            work.done = round(100 * part)
+
+        frames = folder.rendered(built, report=report)
         for number, frame in enumerate(frames, done + 1):
             left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
             remaining = f", about {duration_text(left_s)} left" if number < count else ""
-            bar.say(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}")
+            typer.echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
             for line in warning_lines(frame.warnings, "warning: "):
-                bar.say(line)
+                typer.echo(line, err=True)
     _draw(folder, built, night, adapted, video, fps)
     if linear:
         _write_linear(folder)
     _export(folder, built, gltf, mitsuba)
     typer.echo(folder.path)
-
-
-class _Bar:
-    """What is done to a picture, and how long it still takes, in a line of the terminal."""
-
-    def __init__(self, progress: "Progress") -> None:
-        self._progress, self._what = progress, ""
-        self._task = progress.add_task("", total=1.0, visible=False)
-
-    def report(self, what: str, part: float) -> None:
-        """Show the part of something that is done."""
-        if what != self._what:
-            self._what = what
-            self._progress.reset(self._task, description=what, visible=True)
-        self._progress.update(self._task, completed=part)
-
-    def say(self, line: str) -> None:
-        """Print a line that stays."""
-        self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
-
-
-@contextmanager
-def _bar() -> Iterator[_Bar]:
-    """Yield a bar on standard error, which is there on a terminal only and away at the end."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-    )
-    console = Console(file=cast(TextIO, DetachableStream(sys.stderr)))
-    with Progress(
-        *columns, console=console, transient=True, disable=not sys.stderr.isatty()
-    ) as progress:
-        yield _Bar(progress)
 
 
 def _export(

@@ -111,19 +111,22 @@ def list_them(
 @app.command("show")
 def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     """All there is to know of one run, its notes and earlier results included."""
-    from labrig.catalogue import find_run, summarise
+    from labrig.catalogue import find_run, indexed_summary, unfinished
     from labrig.record import read_notes
 
     folder = find_run(run, runs)
-    summary, notes = summarise(folder), read_notes(folder)
+    summary, notes = indexed_summary(folder), read_notes(folder)
     if json:
-        _print_json({**_summary_json(summary), "notes": notes})
+        about = {"notes": notes, "unfinished": unfinished(summary)}
+        _print_json({**_summary_json(summary), **about})
         return
     typer.echo(f"{folder}")
     measured = measurement(summary.protocol, summary.sample)
     typer.echo(f"  {measured}, {_when(summary)} UTC, {summary.status}")
     units = "unit" if summary.units == 1 else "units"
     typer.echo(f"  {_progress(summary)} {units}, {counted(summary.frames, 'frame')}")
+    for line in unfinished(summary):
+        typer.echo(f"  {_printable(line)}")
     _print_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():

@@ -13,6 +13,7 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, LabrigError, UsageError
+from labrig.foundation.file_kind import TABLE, require_kind
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 from labrig.results.table_clock import TableClock, is_far
 from labrig.results.table_columns import (
@@ -162,10 +163,11 @@ def read_described_series(
     'time t_s (s, line 1); values R (DN/s), G (DN/s), B (DN/s)'
     """
     folder = Path(path)
+    require_kind(folder, TABLE)
     if folder.is_dir():
-        table = folder / "result" / "series.csv"
-        advice = f"fit '{table}'" if table.is_file() else "give the path of a table in it"
-        raise UsageError(f"{folder}: expected a table, got a folder; {advice}")
+        raise UsageError(
+            f"{folder}: expected a table, got a folder; give the path of a table in it"
+        )
     return _parse(read_table_text(folder), str(path), layout)
 
 

@@ -180,9 +180,8 @@ def changed(context: AnalysisContext, **keys: Any) -> AnalysisContext:
 @pytest.mark.parametrize(
     ("region", "sides"),
     [
-        ((94, 22, 184, 196), {"left": 4}),
         ((82, 50, 196, 140), {"above": 20, "below": 20}),
-        ((98, 38, 180, 180), {"left": 8, "above": 8}),
+        ((94, 38, 184, 180), {"left": 4, "above": 8}),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, dict) else "",
 )

@@ -186,7 +186,9 @@ def test_bad_readings_are_refused(
         fit_charge_and_decay(t_s, values, sigma, light_on_s=light_s[0], light_off_s=light_s[1])
 
 
-def test_strontium_aluminate(shared_data: Path) -> None:
+def test_strontium_aluminate(shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Profiles of the orders and rates take three quarters of the time.
+    monkeypatch.setattr("labrig.fit.charge.fit.charge_intervals", lambda *_, **__: {})
     table = shared_data / "decay/perslqy_sao/sample_400_524_300s.txt"
     t_s, counts = np.genfromtxt(table, skip_header=1, usecols=(0, 1), unpack=True)
     fit = fit_charge_and_decay(t_s, counts, None, light_on_s=30.0, light_off_s=330.0)

@@ -52,7 +52,7 @@ def _assert_recovered(fit: DecayFit, truth: States, rtol: float = 1e-6) -> None:
 
 # So flat a valley that damped steps were short two thousandths of the rate before its lowest place.
 @example(truth=((0.0425390625, 0.6796875), (0.01546875, 0.1), (0.006, 0.55859375)), exposure_s=5.0)
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None)
 @given(truth=states(), exposure_s=st.sampled_from([0.0, 0.02, 1.5, 5.0]))
 def test_parameters_are_recovered(truth: States, exposure_s: float) -> None:
     fit = _fit(_exact(truth, exposure_s), n_states=len(truth))

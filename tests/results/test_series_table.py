@@ -325,6 +325,7 @@ def test_a_run_folder_is_answered_with_its_series(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="expected a table, got a folder"):
         read_series(tmp_path)
     (tmp_path / "result").mkdir()
-    (tmp_path / "result" / "series.csv").touch()
+    for name in ("protocol.yaml", "rig.yaml", "result/series.csv"):
+        (tmp_path / name).touch()
     with pytest.raises(UsageError, match=r"result.series\.csv"):
         read_series(tmp_path)

@@ -1,6 +1,6 @@
 """The fade and rise of the simulated lamp, a filament whose heat capacity changes as it cools."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.acquire import Plan, RunObserver
+from labrig.acquire import PlanClock, RunObserver
 from labrig.calibration import FADE_KIND, Change, FadeFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.clock import Clock
@@ -195,7 +195,7 @@ class Busy(Watching):
 
 def test_what_began_late_is_photographed_again(run: Path, tmp_path: Path) -> None:
     @contextmanager
-    def busy(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    def busy(plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
         yield Busy(clock)
 
     again = read_run(record(tmp_path, FADE | {"warming": False}, watch=busy))
