@@ -16,7 +16,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
-from labrig.foundation.number_format import rounded
+from labrig.foundation.number_format import as_written, rounded
 
 #: Format of a number to so many significant digits, as reports write it: `{factor:2r}`.
 ROUNDED = "r"
@@ -178,7 +178,8 @@ class _Values(Formatter):
         if format_spec.endswith(ROUNDED):
             digits = int(format_spec.removesuffix(ROUNDED))
             return "∞" if value == math.inf else rounded(float(value), digits)
-        return str(super().format_field(value, format_spec))
+        text = str(super().format_field(value, format_spec))
+        return text if isinstance(value, str) or not format_spec else as_written(text)
 
 
 _FORMATTER = _Values()

@@ -680,7 +680,14 @@ class FittedDecay:
             lines += wrap(origin, LINE_WIDTH, subsequent_indent=" " * 9)
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         if self.other_laws:
-            lines += aligned([["law", "", "reduced χ²", "BIC"], *self._law_rows()])
+            lines += aligned([["law (* taken)", "", "reduced χ²", "BIC"], *self._law_rows()])
+            if self.compared_laws[0].name != self.law:
+                why = (
+                    f"{LAW_LABELS[self.compared_laws[0].name]} has the lowest BIC and is not "
+                    "taken: a law replaces another one where its BIC is lower by a margin, or it "
+                    "was asked for"
+                )
+                lines += wrap(why, LINE_WIDTH)
         for outside in filter(None, (self.outside_sigma, str(self.unseen_flicker or ""))):
             lines += wrap(f"not in σ {outside}", LINE_WIDTH, subsequent_indent=" " * 9)
         return "\n".join(lines)

@@ -62,3 +62,19 @@ def test_any_text_and_value_survives(sentence: str, subject: str, value: float |
     warning = Disturbance("code", escaped, subject, value=value)
     assert warning.sentence == sentence
     assert ResultWarning.of(json.loads(json.dumps(warning.to_dict()))) == warning
+
+
+@pytest.mark.parametrize(
+    ("form", "value", "text"),
+    [
+        ("{x:.0%}", 0.123, "12 %"),
+        ("{x:+.1f}", -1.25, "−1.2"),
+        ("{x:.1g}", 3.2e-7, "3 × 10⁻⁷"),
+        ("{x:.3g}", 1.5e12, "1.5 × 10¹²"),
+        ("{x}", "re-read", "re-read"),
+        ("{x:>4}", "e-5", " e-5"),
+        ("{x:.2f}", (0.5, -2), "0.50, −2.00"),
+    ],
+)
+def test_numbers_are_written_as_people_do(form: str, value: object, text: str) -> None:
+    assert Disturbance("code", form, x=value).sentence == text
