@@ -2,6 +2,7 @@
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
+from labrig.acquire.adaptation import Adaptation, Offer, adapted
 from labrig.acquire.channels import (
     Board,
     Channel,
@@ -18,6 +19,7 @@ from labrig.acquire.loading import (
     driver_and_settings,
     load_driver,
     read_protocol,
+    require_own_ports,
 )
 from labrig.acquire.plan_clock import Due, PlanClock, step_text
 from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
@@ -55,6 +57,7 @@ __all__ = [
     "SERVICES",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
+    "Adaptation",
     "Board",
     "CalibrationRules",
     "CameraCapabilities",
@@ -71,6 +74,7 @@ __all__ = [
     "LateAction",
     "LuminanceReading",
     "ManualStep",
+    "Offer",
     "Optics",
     "PartUnit",
     "Plan",
@@ -92,6 +96,7 @@ __all__ = [
     "TimedAction",
     "UndoManualStep",
     "Unit",
+    "adapted",
     "at",
     "bank_lights",
     "changes_with_absolute_paths",
@@ -107,6 +112,7 @@ __all__ = [
     "planned_rig",
     "read_protocol",
     "read_rig_file",
+    "require_own_ports",
     "run_units",
     "running_programs",
     "shutter_text",

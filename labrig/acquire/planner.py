@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
 from labrig.acquire.continuation import Continuation, Pace
-from labrig.acquire.loading import driver_and_settings
+from labrig.acquire.loading import driver_and_settings, require_own_ports
 from labrig.acquire.protocol import ProtocolModel, require_inside
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
@@ -229,7 +229,12 @@ def plan(
     for unit in units:
         recorder.unit = unit.name
         clock.spend(pace.reading_s)
-        unit.run(Session(bench, recorder, recorder))
+        try:
+            unit.run(Session(bench, recorder, recorder))
+        except ProtocolError as error:
+            if (part := unit.name.rpartition("/")[0]) and unit.name not in str(error):
+                error.args = (f"part {part}: {error}",)
+            raise
         clock.spend(pace.reading_s)
         unit_ends_s.append(clock.now())
     return Plan(
@@ -281,6 +286,8 @@ def planned_rig(rig: RigFile, source: str, keys: Collection[str] | None = None) 
         _, settings = driver_and_settings(rig, key, source)
         if stand_in := ROLES[key].planned:
             devices[key] = stand_in(settings, clock)
+    if keys is None:
+        require_own_ports(rig, source)
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
     return Rig(rig.name, clock, devices, warm_up_s)
 

@@ -16,6 +16,7 @@ from contextlib import (
 )
 from dataclasses import dataclass, field
 from functools import partial
+from mmap import mmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -35,6 +36,7 @@ from labrig.acquire import (
     in_safe_order,
     load_driver,
     not_opened,
+    require_own_ports,
 )
 from labrig.bench.awake import kept_awake
 from labrig.bench.device_lock import held, network_devices, serial_devices, usb_device
@@ -108,7 +110,7 @@ class Bench:
         DeviceError
             A device is missing, or cannot confirm that it is safe; or the guard cannot be started.
         UsageError
-            Another labrig holds one of the addresses.
+            Another labrig holds one of the addresses, or two devices have one.
         Interrupted
             A stop was requested.
         """
@@ -119,13 +121,14 @@ class Bench:
             stack.enter_context(checking(partial(self.clock.sleep, 0.0)))
             # Entered first, so that ports close after the devices on them are safe.
             transports = stack.enter_context(ExitStack())
+            require_own_ports(self.file, self.source)
             connections = _Connections(self.clock, self.room, transports, self.ports)
             warm_up_s = {key: entry.warm_up for key, entry in self.file.devices.items()}
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
             stack.callback(rig.disconnect)
             stack.callback(self._make_safe, rig)
             # Freed first, so that lack of memory does not prevent the safe state.
-            stack.callback(bytearray(RESERVE_BYTES).clear)
+            stack.callback(mmap(-1, RESERVE_BYTES).close)
             opened = [key for key in self.file.devices if key not in self.left_out]
             for key in in_safe_order(opened):
                 rig.connect(key, partial(_open, self.file, key, connections, self.source))

@@ -21,6 +21,7 @@ from labrig.catalogue.run_summary import STATUSES, RunSummary
 from labrig.foundation.activity import counted
 from labrig.foundation.clock import SystemClock
 from labrig.foundation.errors import DiskError, LabrigError, UsageError
+from labrig.foundation.file_kind import RUN, require_kind, run_around
 from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.foundation.output_file import write_durably
 from labrig.record import require_plain_folder, time_made
@@ -328,6 +329,10 @@ def _find_folder(run: Path, runs: Path) -> Path:
         matches = list(_run_folders(runs, str(run)))
     if len(matches) == 1:
         return matches[0]
+    if not matches:
+        require_kind(run, RUN)
+    if not matches and run.exists() and (around := run_around(run)) is not None:
+        raise UsageError(f"{run}: this is a part of a run; the run is {around}")
     problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
     raise UsageError(
         f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "

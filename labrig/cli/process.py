@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from labrig.cli.completion import complete_run
+from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
     from labrig.analyse import Overrides, ProcessOptions
@@ -172,8 +173,8 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
     if json:
         typer.echo(processed.result.to_json())
         return
-    for warning in processed.result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    for line in warning_lines(processed.result.warnings, "warning: "):
+        typer.echo(line, err=True)
     for text in processed.lines:
         typer.echo(text)
     for number, line in enumerate(processed.changes):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_scene
+from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
     from labrig.reproduce import RenderFolder, Scene
@@ -119,8 +120,8 @@ def render(
     built = _changed(built, times, size, paths).displayed(white, exposure)
     adapted = None if built.white is None else white_under(built.white, built.bands.edges_nm)
     require_traceable(built)
-    for note in built.notes:
-        typer.echo(f"note: {note}", err=True)
+    for line in warning_lines(built.notes, "note: "):
+        typer.echo(line, err=True)
     folder = RenderFolder.open(out or Path("renders") / built.file.name, built)
     done, count = folder.n_done, len(folder.times_s)
     if done:
@@ -139,8 +140,8 @@ def render(
             left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
             remaining = f", about {duration_text(left_s)} left" if number < count else ""
             typer.echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
-            for warning in frame.warnings:
-                typer.echo(f"warning: {warning}", err=True)
+            for line in warning_lines(frame.warnings, "warning: "):
+                typer.echo(line, err=True)
     _draw(folder, built, night, adapted, video, fps)
     if linear:
         _write_linear(folder)
@@ -249,7 +250,7 @@ def _draw(
     frames = [folder.frame(number) for number in range(folder.n_done)]
     pictures, labels = [], []
     look = scene.file.display
-    notes = list(scene.notes)
+    notes = [str(note) for note in scene.notes]
     if adapted_white is not None and not night:
         notes.append(f"white is {look.white}, adapted to the screen by Bradford's transform")
     caption = "; ".join(notes)
@@ -261,7 +262,7 @@ def _draw(
         labels.append(f"{when}; white is {rounded(display.white_luminance, 2)} cd/m²")
         texts = {
             "Description": f"{scene.file.name} at {t_s:g} s",
-            "Comment": "; ".join([display.statement, *scene.notes]),
+            "Comment": "; ".join([display.statement, *map(str, scene.notes)]),
         }
         write_png(folder.path / f"{number:03d}.png", picture, texts)
         pictures.append(picture)

@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.wording import counted, measurement
 from labrig.foundation.errors import UsageError
+from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
@@ -277,8 +278,8 @@ def _print_comparison(comparison: "Comparison") -> None:
 
     for key, value_a, value_b in comparison.protocol_differences:
         typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
-    for warning in comparison.warnings:
-        typer.echo(f"warning: {warning}")
+    for line in warning_lines(comparison.warnings, "warning: "):
+        typer.echo(line)
     if comparison.missing:
         typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
     if not comparison.patches:

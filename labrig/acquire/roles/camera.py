@@ -1,6 +1,7 @@
 """The camera, which delivers RAW frames."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -142,8 +143,15 @@ def exercise_camera(camera: Camera, context: ExerciseContext) -> Exercised:
     return Exercised(
         (_measured_offers(capabilities), *measured, *reduced.measured),
         reduced.findings,
-        (suggestion, *reduced.suggestions),
+        (suggestion, *reduced.suggestions, *_offers(capabilities)),
     )
+
+
+def _offers(capabilities: CameraCapabilities) -> Iterator[Suggestion]:
+    """Yield the sensitivities and apertures, which a plan does not ask the camera for."""
+    for key, values in (("isos", capabilities.isos), ("f_numbers", capabilities.f_numbers)):
+        if values:
+            yield Suggestion(key, f"[{', '.join(f'{value:g}' for value in values)}]")
 
 
 def _timing(

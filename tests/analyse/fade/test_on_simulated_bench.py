@@ -22,6 +22,7 @@ from tests.acquire.fakes import Watching
 from tests.analyse.recorded import cut_off_and_resumed, processed_once, record
 from tests.analyse.small_runs import FADE
 from tests.results.made import assert_read_back
+from tests.warned import codes
 
 #: Of a photograph, relative.
 FLICKER = 0.007
@@ -117,7 +118,7 @@ def test_what_glows_after_the_lamp_is_no_glowing_bodys(tmp_path: Path) -> None:
 
     protocol = FADE | {"warming": False, "rise": False, "every": "80 ms"}
     result: Any = process_run(record(tmp_path, protocol, afterglow))
-    assert any("is not that of a glowing body" in warning for warning in result.warnings)
+    assert "lamp-not-glowing-body" in codes(result.warnings)
 
 
 def test_the_light_of_a_frame_has_all_that_scatters_from_one_to_the_next(
