@@ -279,9 +279,7 @@ class RunFolder:
         """
         recorded = [file.path.name for attempt in self.read().attempts for file in attempt.files]
         last = max(recorded, default="")
-        later = [
-            name for name in self.unknown_files() if name > last and not name.endswith(PART)
-        ]
+        later = [name for name in self.unknown_files() if name > last and not name.endswith(PART)]
         return later if len(later) > 1 else []
 
     def attempt(
