@@ -109,6 +109,11 @@ class MaestroServo(Servo):
         """Return the pulse as it is sent."""
         return quarters(position)
 
+    @classmethod
+    def outlet(cls, settings: Settings) -> Hashable:
+        """Return the number of the Maestro, and of its channel."""
+        return settings.device_number, settings.channel
+
     def place(self) -> str:
         """Return the number of the Maestro's channel."""
         return f"channel {self.settings.channel}"

@@ -2,8 +2,7 @@
 
 import inspect
 import operator
-import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from copy import copy
 from functools import cache, reduce
@@ -17,6 +16,7 @@ from labrig.acquire import ROLES, BoardDevice, DeviceEntry, RigFile
 from labrig.design import WishFile
 from labrig.foundation import plugins
 from labrig.foundation.errors import UsageError
+from labrig.foundation.key_texts import descriptions
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import FluorescentMaterial, Material
 from labrig.reproduce import SceneFile
@@ -97,7 +97,7 @@ def _rig() -> Any:
 @cache
 def _entry(driver: str, fitted: type) -> type[BaseModel]:
     """Return the model of a device's entry with that driver, as the class that fills its role."""
-    texts = _descriptions(DeviceEntry)
+    texts = descriptions(DeviceEntry)
     shared: dict[str, Any] = {}
     for name, field in DeviceEntry.model_fields.items():
         described = copy(field)
@@ -122,7 +122,7 @@ class _Described(GenerateJsonSchema):
         made = super().model_schema(schema)
         model = schema["cls"]
         made["description"] = inspect.cleandoc(model.__doc__ or "").partition("\n\n")[0]
-        texts = _descriptions(model)
+        texts = descriptions(model)
         for branch in (made, *made.get("anyOf", [])):
             for name, field in model.model_fields.items():
                 place: dict[str, Any] = branch.get("properties", {}).get(field.alias or name, {})
@@ -139,19 +139,3 @@ class _Described(GenerateJsonSchema):
             written = SchemaSerializer(schema["schema"])
             made["default"] = written.to_python(schema["default"], mode="json", by_alias=True)
         return made
-
-
-def _descriptions(model: type[BaseModel]) -> dict[str, str]:
-    """Description of every documented field of a model, of its base classes', too, by name."""
-    texts: dict[str, str] = {}
-    for part in reversed(model.__mro__):
-        texts.update(_attributes(inspect.cleandoc(part.__doc__ or "")))
-    return texts
-
-
-def _attributes(documented: str) -> Iterator[tuple[str, str]]:
-    """Name and text of each entry in a numpy docstring's section of attributes."""
-    _, _, section = documented.partition("Attributes\n----------\n")
-    for names, text in re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?|\n(?=    ))+)", section, re.M):
-        for name in names.split(","):
-            yield name.strip(), " ".join(text.split())

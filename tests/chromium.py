@@ -21,7 +21,7 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
     "--disable-dev-shm-usage",
-    # The first window has no tabs and no address bar: they are pages, too, drawn in another process.
+    # The first window has no tabs and no address bar: these are pages, drawn by another process.
     "--app=data:,",
 )
 SIZE = (1200, 820)

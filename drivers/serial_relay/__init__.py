@@ -126,6 +126,8 @@ class SerialRelay(Board):
         The board does not identify itself as the rig file says.
     """
 
+    has_own_commands = True
+
     class Settings(BoardSettings):
         """Keys of the line, and commands that concern all of the board."""
 

@@ -2,6 +2,7 @@
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
+from labrig.acquire.adaptation import Adaptation, Offer, adapted
 from labrig.acquire.channels import (
     Board,
     Channel,
@@ -11,13 +12,16 @@ from labrig.acquire.channels import (
     TemperatureSensor,
 )
 from labrig.acquire.connections import Connections, SerialPort
+from labrig.acquire.continuation import Continuation
 from labrig.acquire.loading import (
     bank_lights,
     changes_with_absolute_paths,
     driver_and_settings,
     load_driver,
     read_protocol,
+    require_own_ports,
 )
+from labrig.acquire.plan_clock import Due, PlanClock, step_text
 from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -53,12 +57,15 @@ __all__ = [
     "SERVICES",
     "TOLERANCE_S",
     "TYPICAL_BYTES_PER_PIXEL",
+    "Adaptation",
     "Board",
     "CalibrationRules",
     "CameraCapabilities",
     "Channel",
     "Connections",
+    "Continuation",
     "DeviceEntry",
+    "Due",
     "ExposureSettings",
     "Finding",
     "Frame",
@@ -67,9 +74,11 @@ __all__ = [
     "LateAction",
     "LuminanceReading",
     "ManualStep",
+    "Offer",
     "Optics",
     "PartUnit",
     "Plan",
+    "PlanClock",
     "Positions",
     "Program",
     "ProtocolModel",
@@ -87,6 +96,7 @@ __all__ = [
     "TimedAction",
     "UndoManualStep",
     "Unit",
+    "adapted",
     "at",
     "bank_lights",
     "changes_with_absolute_paths",
@@ -102,8 +112,10 @@ __all__ = [
     "planned_rig",
     "read_protocol",
     "read_rig_file",
+    "require_own_ports",
     "run_units",
     "running_programs",
     "shutter_text",
+    "step_text",
 ]
 __all__ += roles.__all__

@@ -41,6 +41,11 @@ class Channel(ABC):
     def place(self) -> str:
         """Return the channel's place on the board, such as `relay 3`; empty if it has no name."""
 
+    @classmethod
+    def outlet(cls, settings: Any) -> Hashable:
+        """Return what of the board the channel with these keys occupies; None if it is unknown."""
+        return None
+
     def identity(self) -> str:
         """Return the place, and what else of the channel is worth recording."""
         return self.place()
@@ -68,6 +73,11 @@ class Switch(Channel):
     def distinct(cls, settings: Any) -> Hashable:
         """Return what no other channel of the board may have in common with this one."""
         return tuple(getattr(settings, key) for key in cls.Settings.model_fields)
+
+    @classmethod
+    def outlet(cls, settings: Any) -> Hashable:
+        """Return what no other switch of the board may have in common with this one."""
+        return cls.distinct(settings)
 
     @abstractmethod
     def command(self, *, on: bool) -> None:
@@ -211,6 +221,8 @@ class Board(ABC):
 
     #: Classes of the channels that the board has.
     channels: ClassVar[tuple[type[Channel], ...]]
+    #: Whether its commands are those of a rig file, so that other drivers may speak on its line.
+    has_own_commands: ClassVar[bool] = False
     #: Name of the board in messages, such as `the Numato board at COM3`.
     name: str
 

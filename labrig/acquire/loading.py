@@ -1,16 +1,19 @@
 """Loading of drivers and protocols by the names under which they are registered."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from pydantic import BaseModel
 
+from labrig.acquire.channels import Board
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import ROLES
+from labrig.acquire.roles.board_device import BoardDevice
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import PROTOCOL, require_kind
 from labrig.foundation.named_files import with_absolute_paths
 from labrig.foundation.plugins import DRIVERS, MEASUREMENTS, load, measurement, names
 from labrig.foundation.yaml_file import read_yaml, validate
@@ -95,6 +98,58 @@ def driver_and_settings(rig: RigFile, key: str, source: str) -> tuple[Any, Any]:
     return driver, validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
 
 
+def require_own_ports(rig: RigFile, source: str) -> None:
+    """Refuse two kinds of boards at one address, and two devices on one channel of a board.
+
+    Parameters
+    ----------
+    rig
+        Rig file with the devices.
+    source
+        Name or path of the rig file, for messages.
+
+    Raises
+    ------
+    UsageError
+        Two devices contradict each other, or there is no such driver, or a key is invalid.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.acquire import require_own_ports
+    >>> require_own_ports(labrig.read_rig_file("runs/decay/rig.yaml"), "rig.yaml")
+    """
+    devices = {key: driver_and_settings(rig, key, source) for key in rig.devices}
+    at: dict[str, str] = {}
+    occupied: dict[tuple[str, Hashable], str] = {}
+    for key, entry in rig.devices.items():
+        for address in entry.addresses():
+            other = at.setdefault(address.casefold(), key)
+            drivers = (rig.devices[other].driver, entry.driver)
+            if drivers[0] != drivers[1] and any(map(_knows_one_board, drivers)):
+                raise UsageError(
+                    f"{source}: 'devices.{other}' and 'devices.{key}' are both at {address}, one "
+                    f"with the driver {drivers[0]}, the other with {drivers[1]}; a port leads to "
+                    "one board: correct an address or a driver ('labrig rig list' shows the ports)"
+                )
+        driver, settings = devices[key]
+        if not issubclass(driver, BoardDevice):
+            continue
+        for address, outlet in driver.outlets(entry.address, settings):
+            other = occupied.setdefault((address.casefold(), outlet), key)
+            if other != key and outlet is not None:
+                raise UsageError(
+                    f"{source}: 'devices.{other}' and 'devices.{key}' are on the same "
+                    f"channel of the board at {address}; give each "
+                    "its own"
+                )
+
+
+def _knows_one_board(driver: str) -> bool:
+    registered = load(DRIVERS, driver, "")
+    return issubclass(registered, Board) and not registered.has_own_commands
+
+
 def bank_lights(rig: RigFile, key: str, source: str) -> dict[str, Any]:
     """Return what a rig file says of the light of a bank, without opening any device.
 
@@ -170,6 +225,7 @@ def read_protocol(
     ['dark', 'meter', 'decay-1']
     """
     path = Path(path)
+    require_kind(path, PROTOCOL)
     content = read_yaml(path)
     model = _model(content, str(path))
     content = with_absolute_paths(content, model, path.resolve().parent)

@@ -7,6 +7,8 @@ from typing import Annotated, Any, ClassVar, Protocol, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from labrig.acquire.adaptation import Adaptation, adapted
+from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.acquire.values import CameraCapabilities
@@ -129,6 +131,8 @@ class ProtocolModel(FrozenModel):
 
     #: Kinds of calibrations on which the results depend.
     requires: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
+    #: Keys of `optics:` without whose curves a run is recorded, and cannot be processed.
+    curves: ClassVar[tuple[str, ...]] = ()
     #: Whether calibrations that are kept beside the runs are used; not by what measures them anew.
     uses_calibrations: ClassVar[bool] = True
 
@@ -181,6 +185,25 @@ class ProtocolModel(FrozenModel):
         """
         return self
 
+    def adapted_to(
+        self, rig: Rig, chosen: Collection[str] | None = None
+    ) -> tuple[Self, Sequence[Adaptation]]:
+        """Return the protocol with all values that nobody chose among those of a rig; and which.
+
+        Parameters
+        ----------
+        rig
+            Open devices, or stand-ins of a plan.
+        chosen
+            Dotted keys whose values a person chose; None: those that the protocol's file sets.
+
+        Raises
+        ------
+        ProtocolError
+            The rig does not offer a value that was chosen.
+        """
+        return adapted(self, rig, chosen)
+
     def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
         """Return how repeated frames are spaced in time, in lines for a plan; mostly none."""
         return ()
@@ -188,6 +211,23 @@ class ProtocolModel(FrozenModel):
     def notes(self, rig: RigFile) -> Sequence[str]:
         """Return what a person should know of this protocol on a rig before a run, a line each."""
         return ()
+
+    def unnamed_curves(self, rig: RigFile) -> Mapping[str, Sequence[str]]:
+        """Return the curves that the results need and the rig file does not name.
+
+        Those of colour filters that are shipped are invented ones, for simulated rigs.
+
+        Returns
+        -------
+        dict of str to sequence of str
+            Protocols that need a curve, by its key under `optics:`.
+        """
+        return {
+            key: (self.protocol,)
+            for key in self.curves
+            if getattr(rig.optics, key) is None
+            and not (key == "filters" and rig.simulation is not None)
+        }
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols whose results this one needs and the rig file does not name."""

@@ -11,7 +11,7 @@ from labrig.foundation.errors import (
     DeviceError,
     DeviceLostError,
     LabrigError,
-    ProtocolError,
+    MissingDeviceError,
     UnclearAnswerError,
 )
 
@@ -54,7 +54,7 @@ class Rig:
 
         Raises
         ------
-        ProtocolError
+        MissingDeviceError
             If the rig has no such device.
         """
         return cast(DeviceT, self.device(role.key))
@@ -67,11 +67,11 @@ class Rig:
 
         Raises
         ------
-        ProtocolError
+        MissingDeviceError
             If the rig has no such device.
         """
         if key not in self.devices:
-            raise ProtocolError(
+            raise MissingDeviceError(
                 f"the protocol needs a {ROLES[key].name}, the rig '{self.name}' has none "
                 f"(only {', '.join(sorted(self.devices)) or 'nothing'}); add it under 'devices:'"
             )

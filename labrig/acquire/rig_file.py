@@ -12,6 +12,7 @@ from labrig.acquire.roles import ROLES
 from labrig.calibration import CalibrationKind, kinds
 from labrig.foundation import resources
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import RIG, require_kind
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.named_files import FilePath, ShippedOrFile, is_path, with_absolute_paths
 from labrig.foundation.plugins import DRIVERS, load
@@ -394,6 +395,7 @@ def read_rig_file(path: str | Path) -> RigFile:
     ('numato', 'canon_eos_5d_mark_ii')
     """
     path = Path(path)
+    require_kind(path, RIG)
     folder = path.resolve().parent
     content = with_absolute_paths(read_yaml(path), RigFile, folder)
     if isinstance(devices := content.get("devices"), dict):

@@ -150,7 +150,8 @@ class CameraCapabilities:
         if settings.iso not in self.isos:
             raise ProtocolError(
                 f"the camera does not offer ISO {settings.iso} (natively); choose one of "
-                f"{', '.join(map(str, self.isos))}"
+                f"{', '.join(map(str, self.isos))}, or name it in 'isos' under devices.camera if "
+                "'labrig rig check' prints it"
             )
         if self.f_numbers and settings.f_number not in self.f_numbers:
             requested = "no aperture" if settings.f_number is None else f"f/{settings.f_number:g}"

@@ -3,7 +3,9 @@
 import os
 import re
 import socket
+import threading
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, wait
 from contextlib import (
     AbstractContextManager,
     ExitStack,
@@ -34,13 +36,15 @@ from labrig.acquire import (
     in_safe_order,
     load_driver,
     not_opened,
+    require_own_ports,
 )
 from labrig.bench.awake import kept_awake
 from labrig.bench.device_lock import held, network_devices, serial_devices, usb_device
 from labrig.bench.guard import Guard, guarding
 from labrig.bench.serial_ports import SerialPorts
 from labrig.consent import NETWORK_SCHEMES, calls, require_consent
-from labrig.foundation.clock import Clock, SystemClock
+from labrig.foundation.activity import checking
+from labrig.foundation.clock import CHECK_INTERVAL_S, Clock, SystemClock
 from labrig.foundation.errors import DeviceError, LabrigError, UsageError
 from labrig.foundation.named_files import with_absolute_paths
 from labrig.foundation.output_file import REAL_DISK, Disk
@@ -106,15 +110,18 @@ class Bench:
         DeviceError
             A device is missing, or cannot confirm that it is safe; or the guard cannot be started.
         UsageError
-            Another labrig holds one of the addresses.
+            Another labrig holds one of the addresses, or two devices have one.
         Interrupted
             A stop was requested.
         """
         with ExitStack() as stack:
             stack.enter_context(interrupting(self.clock))
             stack.enter_context(pausing(self.clock))
+            # A protocol that reduces its frames can be stopped between two of them.
+            stack.enter_context(checking(partial(self.clock.sleep, 0.0)))
             # Entered first, so that ports close after the devices on them are safe.
             transports = stack.enter_context(ExitStack())
+            require_own_ports(self.file, self.source)
             connections = _Connections(self.clock, self.room, transports, self.ports)
             warm_up_s = {key: entry.warm_up for key, entry in self.file.devices.items()}
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
@@ -411,7 +418,7 @@ class _Connections:
         host, port = _host_and_port(address, default_port)
         try:
             self._lock(network_devices(host, port), address)
-            connected = socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S)
+            connected = self._connected(host, port)
             # commands are small, and somebody waits for the answer to each
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except (OSError, UnicodeError) as error:
@@ -421,6 +428,22 @@ class _Connections:
             ) from None
         self._stack.callback(connected.close)
         return connected
+
+    def _connected(self, host: str, port: int) -> socket.socket:
+        """Return a connection; the system looks for it in a thread, so that Ctrl-C acts at once."""
+        attempt: Future[socket.socket] = Future()
+
+        def connect() -> None:
+            try:
+                attempt.set_result(socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S))
+            except Exception as error:
+                attempt.set_exception(error)
+
+        threading.Thread(target=connect, daemon=True).start()
+        while not attempt.done():
+            wait([attempt], CHECK_INTERVAL_S)
+            self.clock.sleep(0.0)
+        return attempt.result()
 
     def _find(self, address: str, serial_of: Callable[[Any], str] | None) -> Any:
         url = urlsplit(address)

@@ -1,13 +1,15 @@
 """Runs: preparing, recording and resuming a protocol on a bench in a run folder."""
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
 from labrig.acquire import (
+    Adaptation,
     Plan,
     ProtocolModel,
     RigFile,
@@ -22,10 +24,27 @@ from labrig.bench.opening import open_bench, wall_at_start, with_frame_size
 from labrig.bench.run_log import run_log
 from labrig.bench_optics import require_optics
 from labrig.calibration import REFERENCE_KIND
-from labrig.foundation.errors import DiskError, ProtocolError, UsageError
+from labrig.foundation import resources
+from labrig.foundation.errors import DiskError, MissingDeviceError, ProtocolError, UsageError
 from labrig.foundation.plugins import bench_check
 from labrig.foundation.yaml_file import yaml_text
-from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
+from labrig.record import CALIBRATIONS_FILE, JOURNAL, RunFolder, RunSize, read_run, size_text
+
+#: Consequence of the lack of a curve, by its key under `optics:`.
+_CURVES = {
+    "lamp": (
+        "the rig file names no spectrum of the lamp ('lamp' under 'optics:'): {parts} can only be "
+        "recorded, and processed once it does"
+    ),
+    "grey_card": (
+        "the rig file names no reflectance of the grey card ('grey_card' under 'optics:'): {parts} "
+        "can only be recorded, and processed once it does"
+    ),
+    "filters": (
+        "the rig file names no colour filters ('filters' under 'optics:', a folder with their "
+        "curves): {parts} asks for the shipped ones, which are invented; name yours before the run"
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -38,6 +57,7 @@ class Recording:
     runs: Path
     plan: Plan
     found: FoundCalibrations
+    adaptations: tuple[Adaptation, ...] = ()
 
     @classmethod
     def prepare(
@@ -67,7 +87,12 @@ class Recording:
         """
         requested = read_protocol(protocol_path, changes)
         rig = with_frame_size(read_rig_file(rig_path), str(rig_path))
-        planned_rig(rig, str(rig_path))  # what is malformed there is named with the file's path
+        # What is malformed there is named with the file's path.
+        planned = planned_rig(rig, str(rig_path))
+        with _naming(protocol_path, rig_path):
+            requested, adaptations = requested.adapted_to(
+                planned, changes if _is_shipped(protocol_path) else None
+            )
         # A kept file that is malformed does not stop a run that measures it anew.
         found = (
             find_calibrations(
@@ -84,7 +109,7 @@ class Recording:
         require_optics(found.rig)
         run_plan = _planned(protocol, protocol_path, found.rig, rig_path)
         _require_free_disk(runs, run_plan.size())
-        return cls(protocol, found.rig, rig_path, runs, run_plan, found)
+        return cls(protocol, found.rig, rig_path, runs, run_plan, found, tuple(adaptations))
 
     def notes(self) -> tuple[str, ...]:
         """Return notes for the user before the run, one line each."""
@@ -104,10 +129,16 @@ class Recording:
         is_unchecked = has_picture and not any(
             check in (unit.rpartition("/")[0], self.protocol.protocol) for unit in self.plan.units
         )
+        uncurved = (
+            _CURVES[key].format(parts=", ".join(parts))
+            for key, parts in self.protocol.unnamed_curves(self.rig).items()
+        )
         return (
+            *(f"adapted to this rig: {each}" for each in self.adaptations),
             *self.found.notes,
             *(unchecked if is_unchecked else ()),
             *unmeasured,
+            *uncurved,
             *self.protocol.notes(self.rig),
         )
 
@@ -157,7 +188,12 @@ class Recording:
         return {CALIBRATIONS_FILE: yaml_text(record)} if record else {}
 
 
-def resume_run(path: Path, watch: Watch) -> Path:
+def _refuse(question: str) -> bool:
+    """Answer as somebody who is not there."""
+    return False
+
+
+def resume_run(path: Path, watch: Watch, confirm: Callable[[str], bool] = _refuse) -> Path:
     """Complete a run: units that were not finished are done, again if need be.
 
     Parameters
@@ -166,6 +202,8 @@ def resume_run(path: Path, watch: Watch) -> Path:
         The run's folder.
     watch
         What is told of steps and devices, and asked for what is done by hand.
+    confirm
+        Function that answers whether to record again what the journal has lost.
 
     Returns
     -------
@@ -175,7 +213,8 @@ def resume_run(path: Path, watch: Watch) -> Path:
     Raises
     ------
     UsageError
-        The path is not a run folder.
+        The path is not a run folder, or lines of its journal were lost and nobody confirmed to
+        record again what they were about.
     DiskError
         The disk has no room for the frames and results that are missing.
 
@@ -202,18 +241,64 @@ def resume_run(path: Path, watch: Watch) -> Path:
         RunFolder(path, bench.seed, bench.disk) as folder,
         run_log(path, rig.name, bench.clock),
     ):
+        _confirm_losses(folder, confirm)
         execute(folder, protocol, bench, run_plan, watch)
     return path
 
 
+def _confirm_losses(folder: RunFolder, confirm: Callable[[str], bool]) -> None:
+    """Ask whether to record again what was recorded, but has lost its lines in the journal.
+
+    Raises
+    ------
+    UsageError
+        Nobody confirmed it.
+    """
+    if not (lost := folder.lost_files()):
+        return
+    done = list(folder.read().completed())
+    kept = (
+        f"{len(done)} complete units are left in it, the last is {done[-1]}"
+        if done
+        else ("no complete unit is left in it")
+    )
+    loss = (
+        f"{folder.path / JOURNAL}: its end was lost: {len(lost)} frames have no line in it, "
+        f"{lost[0]} to {lost[-1]}; {kept}"
+    )
+    if not confirm(f"{loss}; go on and record the rest again?"):
+        raise UsageError(
+            f"{loss}; restore the journal from a copy, or record the rest again: labrig resume "
+            f"{folder.path} --yes"
+        )
+
+
 def _planned(protocol: ProtocolModel, path: Path, rig: RigFile, rig_path: Path) -> Plan:
     """Lay out the plan; what in the protocol makes it impossible is named with the file's path."""
-    try:
+    with _naming(path, rig_path):
         return plan(protocol, rig, str(rig_path))
+
+
+@contextmanager
+def _naming(path: Path, rig_path: Path) -> Iterator[None]:
+    """Name the file of a protocol in a refusal; of a shipped one how to get a file to change."""
+    try:
+        yield
     except ProtocolError as error:
-        if str(rig_path) not in str(error):
+        if isinstance(error, MissingDeviceError):
+            error.args = (f"{error} of {rig_path}",)
+        elif _is_shipped(path):
+            error.args = (
+                f"{path.stem}: {error}; keys of a shipped protocol are changed in a copy: "
+                f"labrig protocol new {path.stem}",
+            )
+        elif str(rig_path) not in str(error):
             error.args = (f"{path}: {error}",)
         raise
+
+
+def _is_shipped(path: Path) -> bool:
+    return path in resources.names(resources.PROTOCOLS).values()
 
 
 def _require_free_disk(folder: Path, size: RunSize) -> None:

@@ -18,8 +18,10 @@ from typing import Any, Self
 from zlib import crc32
 
 from labrig.catalogue.run_summary import STATUSES, RunSummary
+from labrig.foundation.activity import counted
 from labrig.foundation.clock import SystemClock
 from labrig.foundation.errors import DiskError, LabrigError, UsageError
+from labrig.foundation.file_kind import RUN, require_kind, run_around
 from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.foundation.output_file import write_durably
 from labrig.record import require_plain_folder, time_made
@@ -108,7 +110,7 @@ def read_summaries(runs: Path) -> list[RunSummary]:
     index, clock = _read_index(runs), SystemClock()
     entries: dict[str, _Entry] = {}
     lasting: dict[str, _Entry] = {}
-    for name in (path.name for path in runs.iterdir()):
+    for name in counted([path.name for path in runs.iterdir()], "reading runs"):
         if name in index and index[name].holds(f"{runs}/{name}"):
             entries[name] = lasting[name] = index[name]
         elif is_run(runs / name):
@@ -121,6 +123,34 @@ def read_summaries(runs: Path) -> list[RunSummary]:
         _write_index(runs, lasting)
     summaries = [entry.summary(runs / name).at_present() for name, entry in entries.items()]
     return sorted(summaries, key=lambda run: (run.made, run.folder.name))
+
+
+def indexed_summary(run: Path) -> RunSummary:
+    """Return the summary of a run, from the index of its folder where that holds.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+
+    Returns
+    -------
+    RunSummary
+        Summary of the run; it is made anew where the index has none, or an older one.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import indexed_summary
+    >>> indexed_summary(Path("runs/decay")).status
+    'processed'
+    """
+    entry = _read_index(run.parent).get(run.name)
+    if entry is None or not entry.holds(str(run)):
+        from labrig.catalogue.summarising import summarise
+
+        return summarise(run)
+    return entry.summary(run).at_present()
 
 
 def is_run(folder: Path) -> bool:
@@ -299,6 +329,10 @@ def _find_folder(run: Path, runs: Path) -> Path:
         matches = list(_run_folders(runs, str(run)))
     if len(matches) == 1:
         return matches[0]
+    if not matches:
+        require_kind(run, RUN)
+    if not matches and run.exists() and (around := run_around(run)) is not None:
+        raise UsageError(f"{run}: this is a part of a run; the run is {around}")
     problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
     raise UsageError(
         f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "

@@ -19,6 +19,7 @@ from labrig.design.search import PREFERENCE
 from labrig.design.solver import KEY_SIGMA, MAX_STATES, solve
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import WISH, require_kind
 from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive, UnitFraction
 from labrig.foundation.named_files import beside
 from labrig.foundation.quantity import DurationS, Fraction, TimeS
@@ -339,6 +340,7 @@ def read_wish(path: Path) -> Wish:
     >>> read_wish(Path("wish.yaml")).keys.radiance.round(5).tolist()
     [[9e-05, 0.00336, 0.00074]]
     """
+    require_kind(path, WISH)
     return to_wish(read_model(path, WishFile), str(path), path.parent)
 
 

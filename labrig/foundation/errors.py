@@ -27,6 +27,10 @@ class ProtocolError(UsageError):
     """A plan that cannot work on this rig, found before anything has moved."""
 
 
+class MissingDeviceError(ProtocolError):
+    """A rig that lacks a device of the protocol."""
+
+
 class DeviceError(LabrigError):
     """A device that did not answer, or gave an unexpected answer.
 

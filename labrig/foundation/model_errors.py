@@ -64,7 +64,9 @@ def is_rule(problem: ErrorDetails) -> bool:
     return problem["type"] in _RULES
 
 
-def refusal(problem: ErrorDetails, alike: Sequence[ErrorDetails]) -> str:
+def refusal(
+    problem: ErrorDetails, alike: Sequence[ErrorDetails], unit: tuple[str, float] = ("", 1.0)
+) -> str:
     """Return what was expected at a place of a file.
 
     Parameters
@@ -73,6 +75,8 @@ def refusal(problem: ErrorDetails, alike: Sequence[ErrorDetails]) -> str:
         Error of pydantic.
     alike
         Errors at the same place, this one included: those of the other types of a union.
+    unit
+        Unit in which the file has the value, and its size in that of the model.
 
     Returns
     -------
@@ -84,7 +88,7 @@ def refusal(problem: ErrorDetails, alike: Sequence[ErrorDetails]) -> str:
     lacking = [int(each["loc"][-1]) for each in alike if lacks_item(each)]
     if lacking:
         return f"expected {max(lacking) + 1} values, got {min(lacking)}"
-    expected = dict.fromkeys(_expected(each) for each in alike if not is_rule(each))
+    expected = dict.fromkeys(_expected(each, unit) for each in alike if not is_rule(each))
     return f"expected {' or '.join(expected)}"
 
 
@@ -126,9 +130,12 @@ def lacks_item(problem: ErrorDetails) -> bool:
     return problem["type"] == "missing" and isinstance(problem["loc"][-1], int)
 
 
-def _expected(problem: ErrorDetails) -> str:
+def _expected(problem: ErrorDetails, unit: tuple[str, float]) -> str:
+    name, size = unit
     context = {
-        key: f"{value:g}" if isinstance(value, float) else value
+        key: (f"{value / size:g} {name}".rstrip() if value else "0")
+        if isinstance(value, float)
+        else value
         for key, value in problem.get("ctx", {}).items()
     }
     text = _EXPECTED.get(problem["type"], "another value").format_map(context)

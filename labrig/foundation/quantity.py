@@ -37,6 +37,11 @@ _PATTERN = re.compile(
     r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|\.\d+)(?:\s*/\s*(?P<divisor>\d+(?:\.\d+)?))?"
     r"\s*(?P<unit>[A-Za-zµ%]+(?:/[a-z]+[2²])?)\s*"
 )
+_ALL_UNITS = (
+    TIME_S, FRACTION, TEMPERATURE_STEP_K, LENGTH_MM, MASS_PER_AREA_G_PER_M2, SIZE_BYTES,
+)  # fmt: skip
+#: Example of a quantity in a refusal.
+_SUCH_AS = re.compile(r"(unit(?: \([^)]*\))?,? such as )'[^']*'")
 
 
 def parse(text: str, units: dict[str, float]) -> float:
@@ -59,6 +64,60 @@ def parse(text: str, units: dict[str, float]) -> float:
     if not math.isfinite(value):
         raise ValueError(f"expected a finite quantity, got '{text}'")
     return value
+
+
+def unit_of(example: str) -> tuple[str, float]:
+    """Return the unit of a quantity as text, and its size in the unit within labrig.
+
+    Parameters
+    ----------
+    example
+        Text of a quantity, such as `1000 us`.
+
+    Returns
+    -------
+    tuple of str and float
+        Unit and size, such as `("us", 1e-6)`; `("", 1.0)` if the text is no quantity.
+
+    Examples
+    --------
+    >>> from labrig.foundation.quantity import unit_of
+    >>> unit_of("1000 us"), unit_of("decay")
+    (('us', 1e-06), ('', 1.0))
+    """
+    match = _PATTERN.fullmatch(example.translate(_LOOKALIKES))
+    for units in _ALL_UNITS:
+        if match is not None and match["unit"] in units:
+            return match["unit"], units[match["unit"]]
+    return "", 1.0
+
+
+def in_unit_of(example: str, refusal: str, received: Any) -> str:
+    """Return the refusal of a quantity with an example in the unit of its key.
+
+    Parameters
+    ----------
+    example
+        Text of a quantity that the key may have, such as `1000 us`; empty if there is none.
+    refusal
+        Refusal with another example, or of another kind, which stays as it is.
+    received
+        Value that was refused; a plain number is the example's.
+
+    Examples
+    --------
+    >>> from labrig.foundation.quantity import in_unit_of
+    >>> in_unit_of("300 ms", "expected a quantity with its unit, such as '60 s'", 60)
+    "expected a quantity with its unit, such as '60 ms'"
+    """
+    unit, _ = unit_of(example)
+    if not unit:
+        return refusal
+    is_number = re.fullmatch(r"\s*\d+(\.\d+)?\s*", str(received)) is not None
+    shown = f"{str(received).strip()} {unit}" if is_number else example
+    if unit in FRACTION and is_number and not _SUCH_AS.search(refusal):
+        return f"{refusal}, such as '{shown}'"
+    return _SUCH_AS.sub(lambda match: f"{match[1]}'{shown}'", refusal)
 
 
 def duration_text(seconds: float) -> str:

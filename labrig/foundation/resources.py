@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import CURVES, MATERIAL, PROTOCOL, RIG, SCENE, require_kind
 from labrig.foundation.named_files import is_path
 from labrig.foundation.plugins import measurements
 from labrig.foundation.yaml_file import did_you_mean
@@ -13,6 +14,14 @@ _PACKAGE = Path(__file__).parents[1]
 PROTOCOLS = "protocols"
 #: Suffixes of shipped files: YAML, or measured curves in JSON.
 SUFFIXES = (".yaml", ".yml", ".json")
+#: Kinds of files by their descriptions in messages.
+_KINDS = {
+    "protocol": (PROTOCOL,),
+    "rig": (RIG,),
+    "material": (MATERIAL,),
+    "scene": (SCENE,),
+    "camera": (CURVES,),
+}
 
 
 def folder(name: str) -> Path:
@@ -42,11 +51,16 @@ def find(place: str, kind: str, name_or_path: str | os.PathLike[str]) -> Path:
     """
     path = Path(name_or_path)
     if path.suffix in SUFFIXES or len(path.parts) > 1:
+        require_kind(path, *_KINDS[kind])
+        if path.is_dir():
+            raise UsageError(f"{path}: expected a {kind} file, got a folder")
         if not path.is_file():
             raise UsageError(f"{path}: no such {kind} file")
         return path
     shipped = names(place)
     if str(path) not in shipped:
+        if path.suffix:
+            require_kind(path, *_KINDS[kind])
         suffix = next(iter(shipped.values())).suffix
         raise UsageError(
             f"no shipped {kind} is called '{path}' (a file of your own is given with its suffix, "

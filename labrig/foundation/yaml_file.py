@@ -18,8 +18,11 @@ from yaml.composer import Composer
 
 from labrig.foundation.errors import UsageError
 from labrig.foundation.input_file import read_text
+from labrig.foundation.key_texts import example
 from labrig.foundation.model_errors import is_rule, lacks_item, place, refusal
 from labrig.foundation.output_file import write_text
+from labrig.foundation.quantity import in_unit_of, unit_of
+from labrig.foundation.yaml_mistake import explain
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
@@ -192,15 +195,10 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
     try:
         content = yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        # libyaml counts the end of the text as a line of its own.
-        place = "" if mark is None else f", line {min(mark.line, text.count(chr(10))) + 1}"
-        problem = " ".join(str(error.problem or error.context).split())
+        mistake = explain(error, text)
+        place = "" if mistake.line is None else f", line {mistake.line}"
         # Looking ahead for the end of a key, libyaml may meet a limit of its own first.
-        if "nesting depth" in problem:
-            problem = TOO_DEEP
-        if mark is not None and _is_indented_by_tab(text, mark.line):
-            problem = "expected spaces before the first word, got a tab; YAML indents with spaces"
+        problem = TOO_DEEP if "nesting depth" in mistake.text else mistake.text
         raise UsageError(f"{source}{place}: {problem}") from None
     except (yaml.YAMLError, ValueError) as error:
         raise UsageError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
@@ -209,13 +207,6 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
             f"{source}: expected 'key: value' lines, got {' '.join(_kind(content).split())}"
         )
     return content
-
-
-def _is_indented_by_tab(text: str, line: int) -> bool:
-    """Return whether a line, counted from 0, has a tab before its first word."""
-    lines = text.split("\n")
-    begin = lines[line] if line < len(lines) else ""
-    return "\t" in begin[: len(begin) - len(begin.lstrip())]
 
 
 def write_yaml(path: Path, model: BaseModel) -> None:
@@ -273,17 +264,33 @@ def _first_problem(
     if problem["type"] == "missing" and not lacks_item(problem):
         return f"the key '{key}' is missing; it is required"
     alike = [each for each in problems if place(each, content) == where]
-    message = refusal(problem, alike)
+    shown = _example(model, where)
+    message = in_unit_of(shown, refusal(problem, alike, unit_of(shown)), problem["input"])
     # A rule of several keys names their values itself.
     names_values = is_rule(problem) and _is_block(problem["input"])
     received = "" if "got " in message or names_values else f", got {_kind(problem['input'])}"
     return f"{_shortened(key)}: {message}{received}" if key else f"{message}{received}"
 
 
+def _example(model: type[BaseModel], where: Sequence[int | str]) -> str:
+    """Return the example of the last key of a place in a file; empty without one."""
+    keys = [number for number, part in enumerate(where) if isinstance(part, str)]
+    if not keys:
+        return ""
+    models = _models_at(model, where[: keys[-1]])
+    return next(filter(None, (example(each, str(where[keys[-1]])) for each in models)), "")
+
+
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> Iterator[str]:
-    """Yield the keys that a mapping at `location` may have, over all possible models."""
+    """Yield the keys that a mapping with this key may have, over all possible models."""
+    for candidate in _models_at(model, location[:-1]):
+        yield from (field.alias or name for name, field in candidate.model_fields.items())
+
+
+def _models_at(model: type[BaseModel], location: Sequence[int | str]) -> Sequence[type[BaseModel]]:
+    """Return the models that a mapping at `location` may have."""
     models: list[type[BaseModel]] = [model]
-    for part in location[:-1]:
+    for part in location:
         inner = [
             nested
             for candidate in models
@@ -292,8 +299,7 @@ def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> It
             for nested in _models_in(field.annotation)
         ]
         models = inner or models
-    for candidate in models:
-        yield from (field.alias or name for name, field in candidate.model_fields.items())
+    return models
 
 
 def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:

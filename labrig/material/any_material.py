@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from labrig.foundation import resources
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import MATERIAL, PICTURE, TABLE, require_kind
 from labrig.foundation.yaml_file import read_yaml
 from labrig.material.file import Material, read_material
 
@@ -58,6 +59,8 @@ def read_any_material(
     'ReradiationMatrix'
     """
     path = Path(name_or_path)
+    if path.suffix:
+        require_kind(path, MATERIAL, TABLE, PICTURE)
     if path.suffix and path.suffix.lower() not in YAML:
         from labrig.material.reradiation import read_reradiation
 

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import Field
 
 from labrig.foundation.errors import DiskError, UsageError
+from labrig.foundation.file_kind import QUEUE, require_kind
 from labrig.foundation.file_lock import plain_lock
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.output_file import write_text
@@ -76,6 +77,7 @@ def read_queue(path: Path) -> Queue:
     """
     if not path.is_file():
         raise UsageError(f"{path}: no such queue; begin one with: labrig queue add PROTOCOL")
+    require_kind(path, QUEUE)
     return read_model(path, Queue)
 
 

@@ -16,6 +16,7 @@ from labrig.catalogue import RunSummary, summarise
 from labrig.fit import fit_power_law
 from labrig.foundation.errors import FitError, LabrigError
 from labrig.foundation.quantity import duration_text
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.process import describe_without_run, write_with_report
 from labrig.queue.queue_file import Queue, QueuedRun
 from labrig.report import Picture, Report, Section, SweptPoint, Table, sweep_chart
@@ -145,14 +146,14 @@ class QueueEntry:
         return tuple(found_luminances(self.summary.folder))
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[ResultWarning, ...]:
         """Warnings of the run's result."""
         if self.summary is None or self.status != "processed":
             return ()
         try:
             return read_result(self.summary.folder).warnings
         except LabrigError as error:
-            return (str(error),)
+            return (Unmeasured("result-unreadable", "{reason}", reason=str(error)),)
 
     def value(self, key: str) -> float:
         """Return the value of a key in the run's protocol in its unit; NaN if it is no number."""
@@ -334,7 +335,9 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
     tables = (Table(SLOPE_HEAD, tuple(slopes), SLOPES),) if slopes else ()
     swept = (Section("Over what was changed", figures=figures, tables=tables),) if figures else ()
     about = describe_without_run(name, "queue", "", ())
-    warnings = [f"no. {entry.number}: {text}" for entry in listed for text in entry.warnings]
+    warnings = [
+        warning.about(f"no. {entry.number}") for entry in listed for warning in entry.warnings
+    ]
     return Report(about, tuple(warnings), (runs, *swept))
 
 

@@ -267,6 +267,16 @@ class RunFolder:
             path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
         )
 
+    def lost_files(self) -> list[str]:
+        """Return the names of files after the last in the journal, whose lines were lost.
+
+        A crash leaves one at most, which it kept from its line; several had lines.
+        """
+        recorded = [file.path.name for attempt in self.read().attempts for file in attempt.files]
+        last = max(recorded, default="")
+        later = [name for name in self.unknown_files() if name > last]
+        return later if len(later) > 1 else []
+
     def attempt(
         self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]
     ) -> AttemptWriter:

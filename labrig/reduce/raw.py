@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.foundation.errors import FrameError
+from labrig.foundation.file_kind import PHOTOGRAPH, PICTURE, require_kind
 from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.reduce.black_cut_off import BlackCutOff, find_cut_off
 from labrig.reduce.dng import (
@@ -408,10 +409,14 @@ def read_raw(source: str | Path | bytes, name: str = "the frame") -> RawFrame:
         content = source
     else:
         name = str(source)
+        if Path(source).is_dir():
+            require_kind(Path(source), PHOTOGRAPH)
         content = read_bytes(Path(source), MAX_FRAME_BYTES)
     try:
         return _decode(content)
     except FrameError as error:
+        if not isinstance(source, bytes):
+            require_kind(Path(source), PHOTOGRAPH, PICTURE)
         raise FrameError(f"{name}: {error}") from None
 
 

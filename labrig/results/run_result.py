@@ -14,6 +14,7 @@ from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.foundation.output_file import make_folder_in, write_text
 from labrig.foundation.plugins import measurement
+from labrig.foundation.result_warning import ResultWarning, as_warnings
 from labrig.results.text_files import finite
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class RunResult:
     schema_version
         Version of the type's fields: another number means renamed fields or other meanings.
     warnings
-        Limits of the result and remedies, a line each.
+        Limits of the result and remedies. A package may give plain texts.
     """
 
     kind: ClassVar[str]
@@ -47,7 +48,10 @@ class RunResult:
         arbitrary_types_allowed=True, extra="forbid", ser_json_inf_nan="strings"
     )
 
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "warnings", as_warnings(self.warnings))
 
     def provides(self) -> Mapping[str, Any]:
         """Return values for later parts of a chain, by the name of a field of their `Inputs`."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, LabrigError, UsageError
+from labrig.foundation.file_kind import TABLE, require_kind
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 from labrig.results.table_clock import TableClock, is_far
 from labrig.results.table_columns import (
@@ -162,10 +163,11 @@ def read_described_series(
     'time t_s (s, line 1); values R (DN/s), G (DN/s), B (DN/s)'
     """
     folder = Path(path)
+    require_kind(folder, TABLE)
     if folder.is_dir():
-        table = folder / "result" / "series.csv"
-        advice = f"fit '{table}'" if table.is_file() else "give the path of a table in it"
-        raise UsageError(f"{folder}: expected a table, got a folder; {advice}")
+        raise UsageError(
+            f"{folder}: expected a table, got a folder; give the path of a table in it"
+        )
     return _parse(read_table_text(folder), str(path), layout)
 
 
@@ -333,11 +335,11 @@ def _measured_series(table: Block, columns: Columns) -> list[Series]:
     warnings = [*(clock.warnings if clock else ()), *warnings]
     if len(parts) == 1:
         resolution_s = clock.resolution_s if clock else 0.0
-        independent, said = independent_rows(parts[0], measured.lines, resolution_s)
+        independent, repeats = independent_rows(parts[0], measured.lines, resolution_s)
         lines = [measured.lines[row] for row in independent]
         part, limits = with_limits(parts[0].take(independent), lines)
         parts = [part]
-        warnings += [*said, *limits]
+        warnings += [*repeats, *limits]
     return [replace(part, warnings=tuple(warnings)) for part in parts]
 
 

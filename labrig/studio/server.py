@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Never
 from labrig.design import WishFile
 from labrig.foundation.clock import Clock
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import WISH, require_kind
 from labrig.foundation.named_files import beside
 from labrig.foundation.yaml_file import read_model
 from labrig.local_server import LocalServer, RequestHandler
@@ -188,6 +189,8 @@ def design_on_page(
     http
     stopped
     """
+    if start is not None:
+        require_kind(start, WISH)
     wished = None if start is None else read_model(start, WishFile)
     if wished is not None and wished.scene is not None:
         named = wished.scene.file

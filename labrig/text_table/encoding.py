@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from labrig.foundation.errors import UsageError
+from labrig.foundation.file_kind import CURVES, TABLE, require_kind
 from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 
 #: Limit of the lines, above those of a year with a reading each minute: each takes memory and time.
@@ -43,6 +44,7 @@ def read_table_text(path: Path) -> str:
     >>> read_table_text(Path("decay.txt"))
     't/µs\tI\n0\t5\n'
     """
+    require_kind(path, TABLE, CURVES)
     content = read_bytes(path, MAX_TEXT_BYTES)
     if content.startswith(_WORKBOOKS):
         raise UsageError(f"{path}: a workbook, not a text; save the sheet as CSV (UTF-8)")

@@ -31,6 +31,8 @@ from labrig.protocols.steps.bench_configuration import (
 from labrig.protocols.steps.camera_settings import (
     DARKS_PER_EXPOSURE,
     CameraSettings,
+    FramePeriod,
+    exposure_lines,
     frame_times_s,
     longest_exposure_s,
 )
@@ -95,7 +97,7 @@ class Blank(ConfiguredProtocol):
 
     protocol: Literal["blank"] = "blank"
     charge: DurationS = Field(300.0, gt=0)
-    every: DurationS = Field(5.0, gt=0)
+    every: FramePeriod = 5.0
     duration: DurationS = Field(60.0, gt=0, alias="for")
     first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
     later_by: tuple[DurationS, ...] = Field((0.0, 0.1, 0.2, 0.4), min_length=1)
@@ -130,6 +132,10 @@ class Blank(ConfiguredProtocol):
         """Return the shutter times of a sequence's first frame and of all others, in seconds."""
         longest_s = longest_exposure_s(self.every, capabilities)
         return min(capabilities.exposure_at_most(self.exposure), longest_s), longest_s
+
+    def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
+        """Return that the first exposure is another one than was asked for, in a line or none."""
+        return exposure_lines(self.exposure, self.exposures_s(capabilities)[0])
 
     def times_s(self, earliest_s: float, later_s: float) -> list[float]:
         """Return the begin of each frame of a sequence in seconds after lamp off."""

@@ -70,6 +70,8 @@ class CameraCurves(ConfiguredProtocol):
         Number of photographs at each of two exposures of a scene.
     """
 
+    curves = ("lamp",)
+
     protocol: Literal["camera_curves"] = "camera_curves"
     chart: str = "colorchecker"
     card: bool = True

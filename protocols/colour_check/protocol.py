@@ -73,6 +73,8 @@ class ColourCheck(ConfiguredProtocol):
         Number of photographs at each of two exposures of a scene.
     """
 
+    curves = ("lamp", "grey_card")
+
     protocol: Literal["colour_check"] = "colour_check"
     chart: str = "colorchecker"
     through: Literal["all", "none"] | tuple[PatchNumber, ...] = "all"

@@ -27,7 +27,7 @@ from labrig.acquire import (
 from labrig.foundation.quantity import Count, DurationS
 from labrig.optics import read_spectrometer_reading
 from labrig.protocols.steps.bench_configuration import light
-from labrig.protocols.steps.led_scenes import LED_NAMES, LedNames, shuffled
+from labrig.protocols.steps.led_scenes import LED_NAMES, AllLeds, LedNames, shuffled
 from labrig.protocols.steps.patch_names import SampleNames
 from labrig.record import PERSON, SpectrumRecord
 
@@ -86,8 +86,10 @@ class DirectBispectral(ProtocolModel):
         spectrum.
     """
 
+    curves = ("grey_card",)
+
     protocol: Literal["direct_bispectral"] = "direct_bispectral"
-    leds: LedNames = LED_NAMES
+    leds: Annotated[LedNames, AllLeds()] = LED_NAMES
     filters: LedNames | None = None
     samples: SampleNames = ("sample",)
     settle: DurationS = Field(120.0, ge=0)

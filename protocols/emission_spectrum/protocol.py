@@ -22,7 +22,7 @@ from labrig.protocols.steps.bench_configuration import (
     ConfiguredUnit,
     LampKind,
 )
-from labrig.protocols.steps.camera_settings import CameraSettings
+from labrig.protocols.steps.camera_settings import CameraSettings, LongEnoughForCamera
 from labrig.protocols.steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from labrig.protocols.steps.grey_card import light_card
 from labrig.protocols.steps.patch_names import FilterPatches
@@ -130,7 +130,9 @@ class EmissionSpectrum(GlowSettings, ConfiguredProtocol):
     protocol: Literal["emission_spectrum"] = "emission_spectrum"
     select: CameraFilters | None = None
     camera: CameraSettings = CameraSettings(iso=1600)
-    times: tuple[Time, ...] = Field((2.0, 10.0, 30.0, 60.0), min_length=1)
+    times: Annotated[tuple[Time, ...], LongEnoughForCamera()] = Field(
+        (2.0, 10.0, 30.0, 60.0), min_length=1
+    )
     lamps: tuple[LampKind, ...] = Field(("halogen",), min_length=1)
     white: bool = True
     region: Region = (0.0, 0.0, 1.0, 1.0)

@@ -42,6 +42,7 @@ from labrig.protocols.steps.bench_configuration import (
     ConfiguredUnit,
 )
 from labrig.protocols.steps.camera_settings import (
+    FramePeriod,
     dark_exposures_s,
     longest_exposure_s,
 )
@@ -212,7 +213,7 @@ class ExcitationSettings(MeteredSettings):
     charges: tuple[DurationS, ...] = Field((30.0, 300.0), min_length=1)
     direct: tuple[DurationS, ...] = Field((3.0, 10.0, 60.0, 900.0), min_length=1)
     first: DurationS = Field(1.0, ge=0)
-    every: DurationS = Field(4.0, gt=0)
+    every: FramePeriod = 4.0
     duration: DurationS = Field(90.0, gt=0, alias="for")
     last_decay: DurationS = Field(180.0, gt=0)
     rest: Rest = Rest()

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import pairwise
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -103,6 +104,8 @@ class Fade(ConfiguredProtocol):
     bands
         Edges of the wavelength bands in nm, rising.
     """
+
+    curves = ("lamp",)
 
     protocol: Literal["fade"] = "fade"
     camera: CameraSettings = CameraSettings(iso=400, f_number=4.0)
@@ -220,13 +223,25 @@ class WarmingUnit:
         protocol = self.protocol
         session.wait_until_warm("camera")
         light_card(session)
+        capabilities = session.rig[CAMERA].capabilities()
         light = card_light(session, protocol.settings(), protocol.card)
-        steady = light.exposed(HALF, protocol.settings(), session.rig[CAMERA].capabilities())
+        steady = light.exposed(HALF, protocol.settings(), capabilities)
         session.perform(LAMP_OFF)
         session.wait(COOLS_S, "lamp's housing cools")
-        shots = [
-            at(time_s + number * WARMING_EVERY_S, TakeFrame(LampFrames.WARMING, steady))
-            for time_s in WARMING_S
-            for number in range(WARMING_SHOTS)
-        ]
+        busy_s = steady.exposure_s + capabilities.overhead_s
+        shots = [at(s, TakeFrame(LampFrames.WARMING, steady)) for s in warming_times_s(busy_s)]
         session.run_sequence([at(0.0, LAMP_ON), *shots])
+
+
+def warming_times_s(busy_s: float) -> list[float]:
+    """Return the begins of the photographs of the warming lamp in seconds after lamp on.
+
+    A camera that is busy with each for `busy_s` seconds, longer than the usual pause, takes fewer.
+    """
+    every_s = max(WARMING_EVERY_S, math.ceil(10 * busy_s) / 10)
+    return [
+        begin_s + number * every_s
+        for begin_s, next_s in pairwise((*WARMING_S, math.inf))
+        for number in range(WARMING_SHOTS)
+        if number == 0 or begin_s + number * every_s + busy_s <= next_s
+    ]

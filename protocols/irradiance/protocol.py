@@ -174,6 +174,8 @@ class Irradiance(ConfiguredProtocol):
         because the lamp drifts.
     """
 
+    curves = ("lamp", "grey_card")
+
     protocol: Literal["irradiance"] = "irradiance"
     bands_nm: tuple[Nanometres, ...] = BANDS_NM
     select: ExcitingLights | None = None

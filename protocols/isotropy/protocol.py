@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from labrig.acquire import ManualStep, Session, TakeFrame, Unit, at
 from labrig.foundation.quantity import Count, DurationS, duration_text
 from labrig.foundation.region import Region
+from labrig.protocols.steps.camera_settings import FramePeriod
 from labrig.protocols.steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from labrig.protocols.steps.patch_names import Patches
 from labrig.protocols.steps.sample_pose import lights_out
@@ -49,7 +50,7 @@ class Isotropy(GlowSettings):
     protocol: Literal["isotropy"] = "isotropy"
     angles: tuple[Angle, ...] = Field((20, 40, 60, 80), min_length=1)
     first: DurationS = Field(60.0, gt=0)
-    every: DurationS = Field(10.0, gt=0)
+    every: FramePeriod = 10.0
     frames: Count = Field(4, ge=2)
     patch: Literal["inside", "around"] = "inside"
     patches: Patches = Field({"sample": (0.48, 0.35, 0.04, 0.3)}, min_length=1)

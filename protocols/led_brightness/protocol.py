@@ -51,6 +51,8 @@ class LedBrightness(LedSettings):
         Number of spectra in a reading.
     """
 
+    curves = ("grey_card",)
+
     protocol: Literal["led_brightness"] = "led_brightness"
     card: Region = CENTRE
     integration: DurationS = Field(1.0, gt=0)

@@ -57,6 +57,8 @@ class LedFluorescence(LedSettings):
         itself, as in the thesis. The other one stands beside it in the result.
     """
 
+    curves = ("grey_card",)
+
     protocol: Literal["led_fluorescence"] = "led_fluorescence"
     lamps: LampNames = ()
     patches: Patches = Field({"sample": (0.4, 0.4, 0.2, 0.2)}, min_length=1)

@@ -174,6 +174,8 @@ class LvfCalibration(ConfiguredProtocol):
         out.
     """
 
+    curves = ("lamp", "grey_card", "filters")
+
     protocol: Literal["lvf_calibration"] = "lvf_calibration"
     rising: bool | None = None
     rising_on_sample: bool | None = None

@@ -3,7 +3,7 @@
 After Nalbach et al., sections 4.2 to 4.7.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal, Self
 
@@ -29,6 +29,7 @@ from labrig.protocols.steps.bench_configuration import BenchConfiguration, Confi
 from labrig.protocols.steps.chain import Chain, Part
 from labrig.protocols.steps.patch_names import FilterPatches, sample_folders
 from labrig.protocols.steps.sample_turns import SampleTurn, in_sample_turns
+from labrig.record import PERSON
 
 #: Why samples do not rest while another one is measured.
 NOT_DARK = (
@@ -232,9 +233,9 @@ class Phosphor(Chain):
         return self.rests
 
     def notes(self, rig: RigFile) -> Sequence[str]:
-        """Return why rests are shared or not, and the time in the lab with the other way."""
+        """Return what calibrating takes, why rests are shared, and the time with the other way."""
         if not self.samples:
-            return super().notes(rig)
+            return (*super().notes(rig), *self._calibrating(rig))
         _, settings = driver_and_settings(rig, SAMPLE_CHANGER.key, f"rig '{rig.name}'")
         apart = self._lab_time("apart", rig)
         if settings.keeps_dark:
@@ -251,6 +252,33 @@ class Phosphor(Chain):
         return (
             f"no sample rests while another is measured ({why}): at most {apart} in the lab, with "
             f"shared rests {shared}",
+        )
+
+    def _calibrating(self, rig: RigFile) -> Iterator[str]:
+        """Yield how much of the run calibrates the bench, which is needed once for all samples."""
+        bench = {
+            part.name
+            for part in self._links()
+            if part.registered.of == "bench" and part.registered.calibration
+        }
+        if not bench:
+            return
+        laid_out = plan(self, rig, f"rig '{rig.name}'")
+        begins_s = (0.0, *laid_out.unit_ends_s)
+        lasts_s = sum(
+            end_s - begin_s
+            for unit, begin_s, end_s in zip(
+                laid_out.units, begins_s, laid_out.unit_ends_s, strict=False
+            )
+            if unit.partition("/")[0] in bench
+        )
+        by_hand = sum(
+            step.device == PERSON and step.unit.partition("/")[0] in bench
+            for step in laid_out.steps
+        )
+        yield (
+            f"{duration_text(lasts_s)} and {by_hand} steps by hand of this run calibrate the "
+            "bench: 'labrig run calibration' does so once for all samples, and this run finds it"
         )
 
     def _lab_time(self, rests: Literal["shared", "apart"], rig: RigFile) -> str:

@@ -80,6 +80,7 @@ class Reflectance(ConfiguredProtocol):
     """
 
     requires = (LVF_KIND,)
+    curves = ("lamp", "grey_card")
 
     protocol: Literal["reflectance"] = "reflectance"
     camera: CameraSettings = CameraSettings(iso=100)

@@ -20,7 +20,7 @@ from labrig.protocols.steps.bench_configuration import (
     WithConfiguration,
     WithManualStep,
 )
-from labrig.protocols.steps.camera_settings import CameraSettings
+from labrig.protocols.steps.camera_settings import CameraSettings, FramePeriod
 from labrig.protocols.steps.decays import DecaySettings, DecayUnit
 from labrig.protocols.steps.glow import DarkUnit, MeterUnit
 from labrig.protocols.steps.patch_names import Patches
@@ -131,7 +131,7 @@ class Saturation(ProtocolModel):
     protocol: Literal["saturation"] = "saturation"
     charges: tuple[Charge, ...] = Field((300.0, 2700.0, 5400.0), min_length=2)
     weaker: WeakerLight | None = None
-    every: DurationS = Field(5.0, gt=0)
+    every: FramePeriod = 5.0
     spacing: Spacing = "random"
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: DurationS = Field(0.8, ge=0)

@@ -1,14 +1,23 @@
 """Settings of the camera, and times that follow from them."""
 
 import math
-from typing import Annotated
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from labrig.acquire import MAX_STEPS, TOLERANCE_S, CameraCapabilities
+from labrig.acquire import (
+    CAMERA,
+    MAX_STEPS,
+    TOLERANCE_S,
+    CameraCapabilities,
+    Offer,
+    Rig,
+    shutter_text,
+)
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.models import FrozenModel
-from labrig.foundation.quantity import duration_text
+from labrig.foundation.quantity import DurationS, duration_text
 
 
 def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]:
@@ -69,9 +78,93 @@ DARKS_PER_EXPOSURE = 4
 MARGIN_S = 0.5
 
 
+#: Part of the time between two frames that is left for exposing, where a slow camera decides it.
+EXPOSING = 0.25
+
+
+@dataclass(frozen=True)
+class NearestOfCamera(Offer):
+    """Annotation of a sensitivity or an aperture, or of several, each of which is taken once.
+
+    Attributes
+    ----------
+    setting
+        Name of the setting among the camera's capabilities.
+    prefix
+        Text before a value in messages.
+    """
+
+    setting: Literal["isos", "f_numbers"]
+    prefix: str
+
+    def fitted(self, value: Any, rig: Rig) -> Any:
+        """Return the nearest offered values, by ratio; a lens that reports none has any."""
+        offered = self._offered(rig)
+        if value is None or not offered:
+            return value
+        if not isinstance(value, tuple):
+            return min(offered, key=lambda each: abs(math.log(each / value)))
+        return tuple(dict.fromkeys(self.fitted(each, rig) for each in value))
+
+    def reason(self, rig: Rig) -> str:
+        """Return what the camera offers, and where the rig file gives more."""
+        return (
+            f"the camera offers {self.text(self._offered(rig))} ('{self.setting}' of the rig file; "
+            "'labrig rig check' prints those of the connected camera)"
+        )
+
+    def text(self, value: Any) -> str:
+        """Return values such as `f/4, f/5.6`."""
+        values = value if isinstance(value, tuple) else (value,)
+        return ", ".join(f"{self.prefix}{each:g}" for each in values)
+
+    def _offered(self, rig: Rig) -> tuple[float, ...]:
+        if CAMERA not in rig:
+            return ()
+        offered: tuple[float, ...] = getattr(rig[CAMERA].capabilities(), self.setting)
+        return offered
+
+
+@dataclass(frozen=True)
+class LongEnoughForCamera(Offer):
+    """Annotation of the time between two frames, within which a slow camera has to be ready.
+
+    Several times are those of frames' begins.
+    """
+
+    is_required = False
+
+    def fitted(self, value: Any, rig: Rig) -> Any:
+        """Return times in seconds that leave a part for exposing, and are no shorter than asked."""
+        if CAMERA not in rig:
+            return value
+        spent_s = rig[CAMERA].capabilities().overhead_s + MARGIN_S
+        shortest_s = math.ceil(10 * spent_s / (1 - EXPOSING)) / 10
+        if not isinstance(value, tuple):
+            return max(value, shortest_s)
+        begins_s = list(value[:1])
+        for begin_s in value[1:]:
+            begins_s.append(max(begin_s, begins_s[-1] + shortest_s))
+        return tuple(begins_s)
+
+    def reason(self, rig: Rig) -> str:
+        """Return the time that the camera takes for a frame."""
+        overhead_s = rig[CAMERA].capabilities().overhead_s
+        return f"frame_time: the camera takes {duration_text(overhead_s)} after each frame"
+
+    def text(self, value: Any) -> str:
+        """Return the times as text."""
+        return ", ".join(map(duration_text, value if isinstance(value, tuple) else (value,)))
+
+
+#: Relative difference from which an exposure time is another one than was asked for.
+NOTABLE = 0.005
+
 #: Sensitivities and apertures beyond those of any camera and lens are slips of the pen.
-Iso = Annotated[int, Field(ge=1, le=10_000_000)]
-FNumber = Annotated[float, Field(ge=0.1, le=1000)]
+Iso = Annotated[int, Field(ge=1, le=10_000_000), NearestOfCamera("isos", "ISO ")]
+FNumber = Annotated[float, Field(ge=0.1, le=1000), NearestOfCamera("f_numbers", "f/")]
+#: Time from the begin of a frame to that of the next one.
+FramePeriod = Annotated[DurationS, Field(gt=0), LongEnoughForCamera()]
 
 
 class CameraSettings(FrozenModel):
@@ -87,6 +180,13 @@ class CameraSettings(FrozenModel):
 
     iso: Iso = 400
     f_number: FNumber | None = 4.0
+
+
+def exposure_lines(asked_s: float, taken_s: float) -> list[str]:
+    """Return that another exposure is taken than was asked for, in a line for a plan; or none."""
+    if math.isclose(asked_s, taken_s, rel_tol=NOTABLE):
+        return []
+    return [f"{shutter_text(asked_s)} asked, {shutter_text(taken_s)} taken: the camera's nearest"]
 
 
 def dark_exposures_s(longest_s: float, capabilities: CameraCapabilities) -> list[float]:

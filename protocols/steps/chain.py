@@ -1,11 +1,21 @@
 """A chain of protocols in one run, whose parts are written as in files of their own."""
 
 from collections.abc import Collection, Mapping, Sequence, Set
+from dataclasses import replace
 from typing import Any, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import CameraCapabilities, PartUnit, ProtocolModel, RigFile, Sample
+from labrig.acquire import (
+    Adaptation,
+    CameraCapabilities,
+    PartUnit,
+    ProtocolModel,
+    Rig,
+    RigFile,
+    Sample,
+)
+from labrig.foundation.errors import ProtocolError
 from labrig.foundation.plugins import Measurement, measurement
 from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import validate
@@ -84,6 +94,38 @@ class Chain(ProtocolModel):
         ]
         return self.model_copy(update={"parts": tuple(parts)})
 
+    def adapted_to(
+        self, rig: Rig, chosen: Collection[str] | None = None
+    ) -> tuple[Self, Sequence[Adaptation]]:
+        """Return the chain with the values of its parts among those of a rig; and which.
+
+        Parameters
+        ----------
+        rig
+            Open devices, or stand-ins of a plan.
+        chosen
+            Keys of the chain whose values a person chose; None: those that its file sets, and all
+            keys of its parts there.
+
+        Raises
+        ------
+        ProtocolError
+            The rig does not offer a value that was chosen; the message names the part.
+        """
+        in_parts = None if chosen is None or "parts" in chosen else ()
+        parts, adaptations = [], []
+        for content, part in zip(self.parts, self._links(), strict=True):
+            try:
+                protocol, changes = part.protocol.adapted_to(rig, in_parts)
+            except ProtocolError as error:
+                error.args = (f"part {part.name}: {error}",)
+                raise
+            parts.append(content | _changed(part.protocol, protocol))
+            adaptations += [replace(each, key=f"{part.name}: {each.key}") for each in changes]
+        if not adaptations:
+            return self, ()
+        return self.model_copy(update={"parts": tuple(parts)}), adaptations
+
     def frame_spacing(self, capabilities: CameraCapabilities) -> Sequence[str]:
         """Return the parts whose frames are spaced alike, and how, in lines for a plan."""
         parts: dict[tuple[str, ...], list[str]] = {}
@@ -95,6 +137,14 @@ class Chain(ProtocolModel):
             for (first, *others), names in parts.items()
             for text in (f"{', '.join(names)}: {first}", *others)
         ]
+
+    def unnamed_curves(self, rig: RigFile) -> Mapping[str, Sequence[str]]:
+        """Return the curves that any part needs and the rig file does not name, with the parts."""
+        needed: dict[str, list[str]] = {}
+        for part in self._links():
+            for key in part.protocol.unnamed_curves(rig):
+                needed.setdefault(key, []).append(part.name)
+        return needed
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Return the protocols that neither the rig file names nor an earlier part measures."""

@@ -34,7 +34,9 @@ from .bench_configuration import BenchConfiguration, ConfiguredProtocol, Configu
 from .camera_settings import (
     DARKS_PER_EXPOSURE,
     MARGIN_S,
+    FramePeriod,
     dark_exposures_s,
+    exposure_lines,
     frame_times_s,
     longest_exposure_s,
 )
@@ -128,7 +130,7 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
     protocol: Literal["decay"] = "decay"
     charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
     plateau: Plateau = Plateau()
-    every: DurationS = Field(5.0, gt=0)
+    every: FramePeriod = 5.0
     spacing: Spacing = "random"
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
@@ -296,11 +298,13 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
         """Return how the frames of a decay are spaced, in two lines for a plan."""
         spacing = self._random_spacing(capabilities)
         exposure_s = self.longest_exposure_s(capabilities)
+        taken: list[str] = []
         if isinstance(self.exposure, float):
             exposure_s = capabilities.exposure_near(self.exposure)
+            taken = exposure_lines(self.exposure, exposure_s)
         if self.spacing == "even" or not spacing.free_s(exposure_s):
-            return spacing.even_lines(exposure_s)
-        return spacing.lines(exposure_s, len(self.frame_times_s()))
+            return [*taken, *spacing.even_lines(exposure_s)]
+        return [*taken, *spacing.lines(exposure_s, len(self.frame_times_s()))]
 
 
 class DecayFrames(StrEnum):

@@ -15,7 +15,9 @@ from labrig.acquire import (
     LEDS_OFF,
     IlluminantSwitch,
     LedSwitch,
+    Offer,
     ProtocolModel,
+    Rig,
     Session,
     TakeFrame,
 )
@@ -43,6 +45,20 @@ def _once(kind: str) -> AfterValidator:
         return names
 
     return AfterValidator(check)
+
+
+@dataclass(frozen=True)
+class AllLeds(Offer):
+    """Annotation of the names of LEDs, which are all of the rig's where some of them are none."""
+
+    def fitted(self, names: tuple[str, ...], rig: Rig) -> tuple[str, ...]:
+        """Return the names, or those of all LEDs of the rig."""
+        offered = rig[LEDS].channels() if LEDS in rig else names
+        return names if set(names) <= set(offered) else offered
+
+    def reason(self, rig: Rig) -> str:
+        """Return the names of the rig's LEDs."""
+        return f"its LEDs are {self.text(rig[LEDS].channels())}"
 
 
 #: Names of LEDs of the rig, and of lamps of its bank.
@@ -78,7 +94,7 @@ class LedSettings(ProtocolModel):
         spectrum.
     """
 
-    leds: LedNames = LED_NAMES
+    leds: Annotated[LedNames, AllLeds()] = LED_NAMES
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)
     exposures: Annotated[Count, Field(ge=1, le=5)] = 3

@@ -71,6 +71,8 @@ class ValidateIlluminants(ProtocolModel):
         Number of photographs at each exposure.
     """
 
+    curves = ("grey_card",)
+
     protocol: Literal["validate_illuminants"] = "validate_illuminants"
     lamps: Annotated[LampNames, Field(min_length=1)] = LAMP_NAMES
     patches: Patches = Field({"sample": (0.4, 0.4, 0.2, 0.2)}, min_length=1)

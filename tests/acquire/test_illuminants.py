@@ -90,7 +90,7 @@ def test_one_is_lit_at_a_time_recorded_and_read_back(rig: Path, tmp_path: Path) 
 
 
 def test_a_lamp_that_is_not_there_and_another_driver_are_named(rig: Path) -> None:
-    with pytest.raises(ProtocolError, match="a lamp 'dya', which the rig has not; did you mean"):
+    with pytest.raises(ProtocolError, match=r"a lamp 'dya', which the rig has not: .* day, "):
         plan(Lit(protocol="lit", lamps=("dya",)), read_rig_file(rig), str(rig))
     rig.write_text(
         rig.read_text(encoding="utf-8").replace("numato", "maestro"),

@@ -110,7 +110,7 @@ def test_they_are_planned(rig: Path) -> None:
     ]  # fmt: skip
     with pytest.raises(ProtocolError, match="an LED '540 nm', which the rig has not") as caught:
         plan(Colours(protocol="colours", channels=("540 nm",)), read_rig_file(rig), str(rig))
-    assert "did you mean '450 nm'?" in str(caught.value)
+    assert "it has 450 nm, 525 nm; name one of these in 'leds:'" in str(caught.value)
 
 
 def test_a_rig_without_them_is_reported_so(make_rig: Make) -> None:

@@ -15,6 +15,7 @@ from PIL import Image
 
 from labrig.foundation import colour_science
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.result_warning import as_warnings
 from labrig.optics import (
     CHART_PATCHES,
     CIE_1931,
@@ -60,9 +61,10 @@ def test_pictures_of_all_times_with_what_was_assumed(labrig: Callable[..., Ended
     np.testing.assert_allclose(linear, luminance, rtol=1e-3, atol=1e-3 * luminance.max())
     assert {"000.png", "001.png", "002.png"} <= {path.name for path in folder.iterdir()}
     content = json.loads((folder / "render.json").read_text(encoding="utf-8"))
-    assert any("pink-paint" in note for note in content["notes"])
+    notes = as_warnings(content["notes"])
+    assert any("pink-paint" in note.subject for note in notes)
     # An assumption is in every picture, too, not only below the sheet.
-    assert all(note in comment(folder / "001.png") for note in content["notes"])
+    assert all(str(note) in comment(folder / "001.png") for note in notes)
     dark = read_spectral_exr(folder / "001.exr").radiance
     later = read_spectral_exr(folder / "002.exr").radiance
     # One exponential of 0.027 per second, which the glow itself slows by a part in a thousand.

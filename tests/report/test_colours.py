@@ -168,7 +168,9 @@ def test_the_misfit_is_what_the_docstring_says() -> None:
 def test_numpy_prints_as_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With a package that does when it is imported as colour-science does, which takes seconds."""
     change = "numpy.set_printoptions(legacy='1.13')"
-    assert "np.set_printoptions(legacy=" in Path(colour_science.load().__file__).read_text()
+    assert "np.set_printoptions(legacy=" in Path(colour_science.load().__file__).read_text(
+        encoding="utf-8"
+    )
     (tmp_path / "colour.py").write_text(f"import numpy\n{change}\n")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setitem(sys.modules, "colour", sys)

@@ -12,6 +12,7 @@ import pytest
 from labrig.fit import DecayFit
 from labrig.foundation.errors import DiskError
 from labrig.foundation.number_format import plus_minus
+from labrig.foundation.result_warning import as_warnings
 from labrig.record.history import Interruption
 from labrig.report import write_report
 from labrig.report.parameters import quality_rows
@@ -315,7 +316,7 @@ def test_a_warning_about_a_patch_of_several_stands_at_its_row(tmp_path: Path) ->
     fit = patch(decay_series()).fit
     assert isinstance(fit, DecayFit)
     clean = replace(patch(decay_series()), fit=replace(fit, warnings=()), name="a")
-    warned = replace(clean, fit=replace(fit, warnings=("too hot",)), name="b")
+    warned = replace(clean, fit=replace(fit, warnings=as_warnings(["too hot"])), name="b")
     report = decay_report(tmp_path, [clean, warned])
     page = Page(written(tmp_path, report, ["b: too hot"]))
     assert page.text.count("1 warning") == 2

@@ -45,6 +45,11 @@ class BoardDevice:
         return keys_model(cls, (channel.Settings, board.Settings))
 
     @classmethod
+    def outlets(cls, address: str, settings: Any) -> list[tuple[str, Hashable]]:
+        """Return what the device occupies: the address of each board, and what of it."""
+        return [(address, cls.channel_class.outlet(settings))]
+
+    @classmethod
     @cache
     def for_board(cls, board: type[Board]) -> "type[BoardDevice] | None":
         """Return the class of the device on a board, None if the board has no such channel."""

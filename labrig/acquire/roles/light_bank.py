@@ -4,7 +4,7 @@ LEDs are narrow bands of light that charge the sample; under broadband lamps, th
 seen as in daily life. Both are one kind of device under two keys of a rig file.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -34,7 +34,6 @@ from labrig.acquire.roles.role import (
 )
 from labrig.foundation.errors import DeviceError, ProtocolError
 from labrig.foundation.quantity import duration_text
-from labrig.foundation.yaml_file import did_you_mean
 
 #: Differences of a head's own wavelength from the rig file's peak, in nm, that are worth a
 #: warning, and that mean another head than was meant.
@@ -205,6 +204,14 @@ class SwitchedLights(BoardDevice):
             if abs(head_nm - peak_nm) > NOTABLE_NM
         ] or read_back_findings(list(self._switches.values()))
 
+    @classmethod
+    def outlets(cls, address: str, settings: Any) -> list[tuple[str, Hashable]]:
+        """Return what each light occupies: the address of its board, and what of it."""
+        return [
+            (light.address or address, cls.channel_class.outlet(light))
+            for light in settings.channels.values()
+        ]
+
     def channels(self) -> tuple[str, ...]:
         """Return the names of the lights, in the rig file's order."""
         return tuple(self._switches)
@@ -322,9 +329,10 @@ class BankSwitch:
     """
 
     channel: str | None
-    #: Key of the role, and what one of its lights is called.
+    #: Key of the role, what one of its lights is called, and the key of protocols that names some.
     device: ClassVar[str]
     noun: ClassVar[str]
+    protocol_key: ClassVar[str]
 
     def __str__(self) -> str:
         return DARK if self.channel is None else f"{self.channel} on"
@@ -343,8 +351,8 @@ class BankSwitch:
             bank.light(self.channel)
         else:
             raise ProtocolError(
-                f"the protocol lights {self.noun} '{self.channel}', which the rig has not; "
-                f"{did_you_mean(self.channel, bank.channels())}"
+                f"the protocol lights {self.noun} '{self.channel}', which the rig has not: it has "
+                f"{', '.join(bank.channels())}; name one of these in '{self.protocol_key}:'"
             )
 
 
@@ -383,6 +391,7 @@ class LedSwitch(BankSwitch):
 
     device = "leds"
     noun = "an LED"
+    protocol_key = "leds"
 
 
 class IlluminantSwitch(BankSwitch):
@@ -390,6 +399,7 @@ class IlluminantSwitch(BankSwitch):
 
     device = "illuminants"
     noun = "a lamp"
+    protocol_key = "lamps"
 
 
 LEDS_OFF = LedSwitch(None)
