@@ -12,6 +12,8 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 FOLDERS = ("drivers", "protocols", "sim", "config")
+#: Pages of the manual that `labrig explain` reads.
+PAGES = ("docs/glossary.md", "docs/reference/warnings.md")
 EDITABLE = ".editable"
 
 
@@ -22,13 +24,13 @@ class OneName(BuildHookInterface[Any]):
         """Prepare a wheel (`version` is "standard") or an editable installation ("editable")."""
         root = Path(self.root)
         if version == "editable":
-            for folder in FOLDERS:
+            for folder in (*FOLDERS, "docs"):
                 _link(root / "labrig" / folder, root / folder)
             (root / EDITABLE).mkdir(exist_ok=True)
             _link(root / EDITABLE / "labrig", root / "labrig")
         else:
             build_data["force_include"] |= {
-                str(root / folder): f"labrig/{folder}" for folder in FOLDERS
+                str(root / part): f"labrig/{part}" for part in (*FOLDERS, *PAGES)
             }
 
 

@@ -20,8 +20,6 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "stale_figures",
-    "typer_commands",
-    "yaml_keys",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build"]

@@ -1,5 +1,6 @@
 """Entry point of the command `labrig`."""
 
+import atexit
 import os
 import signal
 import sys
@@ -10,6 +11,8 @@ from labrig.foundation.signals import STOP_SIGNALS, end_at_once
 # The matrices here are small: threads of the linear algebra would only wait for one another, six
 # times as long where another program computes, too. Has to be said before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+#: Exit codes beyond this one are those of signals.
+SIGNALLED = 128
 
 
 def main() -> None:
@@ -19,7 +22,12 @@ def main() -> None:
     make_streams_readable()
     from labrig.cli import guarded
 
-    sys.exit(guarded(sys.argv[1:]))
+    code = guarded(sys.argv[1:])
+    if code > SIGNALLED:
+        # Who stopped labrig waits for it: to delete all objects one by one may take a second.
+        atexit._run_exitfuncs()
+        os._exit(code)
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
 """Run folders of tests."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from labrig.acquire import Plan, RunObserver, plan, read_protocol, read_rig_file
+from labrig.acquire import PlanClock, RunObserver, plan, read_protocol, read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.bench.execution import execute
 from labrig.foundation.clock import Clock, Interrupted
@@ -14,7 +14,7 @@ from tests.acquire.fakes import Watching
 
 
 @contextmanager
-def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+def quietly(plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
     yield Watching()
 
 

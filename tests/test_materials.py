@@ -12,8 +12,10 @@ from typing import Any
 import pytest
 
 from labrig.foundation import resources
+from labrig.foundation.result_warning import as_warnings
 from labrig.material import read_material
 from tests.conftest import Ended
+from tests.warned import codes
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
@@ -69,7 +71,7 @@ def test_a_power_law_is_flagged(labrig: Labrig, make_rig: Make, tmp_path: Path) 
         )
     )
     assert fit["law"] != "exponentials"
-    assert any("descriptive only" in warning for warning in fit["warnings"])
+    assert "rates-descriptive" in codes(as_warnings(fit["warnings"]))
 
 
 @pytest.mark.campaign

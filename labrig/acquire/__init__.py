@@ -12,6 +12,7 @@ from labrig.acquire.channels import (
     TemperatureSensor,
 )
 from labrig.acquire.connections import Connections, SerialPort
+from labrig.acquire.continuation import Continuation
 from labrig.acquire.loading import (
     bank_lights,
     changes_with_absolute_paths,
@@ -20,6 +21,7 @@ from labrig.acquire.loading import (
     read_protocol,
     require_own_ports,
 )
+from labrig.acquire.plan_clock import Due, PlanClock, step_text
 from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -61,7 +63,9 @@ __all__ = [
     "CameraCapabilities",
     "Channel",
     "Connections",
+    "Continuation",
     "DeviceEntry",
+    "Due",
     "ExposureSettings",
     "Finding",
     "Frame",
@@ -74,6 +78,7 @@ __all__ = [
     "Optics",
     "PartUnit",
     "Plan",
+    "PlanClock",
     "Positions",
     "Program",
     "ProtocolModel",
@@ -111,5 +116,6 @@ __all__ = [
     "run_units",
     "running_programs",
     "shutter_text",
+    "step_text",
 ]
 __all__ += roles.__all__

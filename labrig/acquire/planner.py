@@ -8,11 +8,12 @@ from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
+from labrig.acquire.continuation import Continuation, Pace
 from labrig.acquire.loading import driver_and_settings, require_own_ports
 from labrig.acquire.protocol import ProtocolModel, require_inside
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
-from labrig.acquire.roles import CAMERA, ROLES, Device
+from labrig.acquire.roles import CAMERA, LAMP, LAMP_ON, ROLES, Device
 from labrig.acquire.roles.camera import PlannedCamera
 from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import CameraCapabilities, Frame
@@ -20,7 +21,13 @@ from labrig.foundation.clock import VirtualClock
 from labrig.foundation.errors import ProtocolError
 from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
-from labrig.record import PERSON, ActionRecord, FrameRecord, RunSize, SpectrumRecord
+from labrig.record import (
+    PERSON,
+    ActionRecord,
+    FrameRecord,
+    RunSize,
+    SpectrumRecord,
+)
 
 
 @dataclass(frozen=True)
@@ -67,6 +74,8 @@ class Plan:
         Settings that the camera offers.
     patches
         Largest number of patches of a unit.
+    drawn
+        Units with frames at random times, which the run draws anew.
     """
 
     steps: tuple[Step, ...]
@@ -74,11 +83,20 @@ class Plan:
     unit_ends_s: tuple[float, ...]
     capabilities: CameraCapabilities
     patches: int = 1
+    drawn: frozenset[str] = frozenset()
 
     @property
     def duration_s(self) -> float:
         """Lab time of the whole run in seconds."""
         return self.unit_ends_s[-1] if self.unit_ends_s else 0.0
+
+    def ends_s(self, unit: str) -> float:
+        """Return the end of a unit in seconds after the start of the run."""
+        return self.unit_ends_s[self.units.index(unit)]
+
+    def begins_s(self, unit: str) -> float:
+        """Return the begin of a unit in seconds after the start of the run."""
+        return (0.0, *self.unit_ends_s)[self.units.index(unit)]
 
     @property
     def frames(self) -> int:
@@ -140,6 +158,7 @@ def plan(
     rig: RigFile,
     source: str,
     capabilities: CameraCapabilities | None = None,
+    continuation: Continuation | None = None,
 ) -> Plan:
     """Lay out a protocol on the devices of a rig without opening any of them.
 
@@ -156,6 +175,10 @@ def plan(
         Name or path of the rig file, for messages.
     capabilities
         Settings that the connected camera offers; None for those that the rig file declares.
+    continuation
+        Place at which a run goes on: only units that it lacks are laid out, with the warm-up that
+        devices need from their connection on, and frames as fast as they were. None for a whole
+        run.
 
     Returns
     -------
@@ -191,14 +214,28 @@ def plan(
         require_inside(protocol.named_regions(), capabilities.frame_pixels)
     recorder = _PlanRecorder(clock, capabilities.overhead_s)
     units, unit_ends_s = protocol.units(), []
+    pace = Pace(capabilities.overhead_s)
+    if continuation is not None:
+        pace = continuation.pace(capabilities.overhead_s)
+        completed = continuation.record.completed()
+        units = [unit for unit in units if unit.name not in completed]
+        recorder.follow(continuation)
+        clock.epoch_s = continuation.time
+        bench.connected_s = continuation.connected_time - continuation.time
+        if CAMERA in bench:
+            bench.devices[CAMERA.key] = PlannedCamera(clock, capabilities, pace)
+        if LAMP in bench and continuation.burns(LAMP.key, str(LAMP_ON)):
+            bench[LAMP].on()
     for unit in units:
         recorder.unit = unit.name
+        clock.spend(pace.reading_s)
         try:
             unit.run(Session(bench, recorder, recorder))
         except ProtocolError as error:
             if (part := unit.name.rpartition("/")[0]) and unit.name not in str(error):
                 error.args = (f"part {part}: {error}",)
             raise
+        clock.spend(pace.reading_s)
         unit_ends_s.append(clock.now())
     return Plan(
         tuple(recorder.steps),
@@ -206,6 +243,7 @@ def plan(
         tuple(unit_ends_s),
         capabilities,
         max((len(protocol.patches_of(unit.name)) for unit in units), default=1) or 1,
+        frozenset(recorder.drawn),
     )
 
 
@@ -263,6 +301,18 @@ class _PlanRecorder:
     unit: str = ""
     steps: list[Step] = field(default_factory=list)
     done: list[ActionRecord] = field(default_factory=list)
+    kept: list[ActionRecord] = field(default_factory=list)
+    times: list[tuple[str, str, float]] = field(default_factory=list)
+    drawn: set[str] = field(default_factory=set)
+
+    def follow(self, continuation: Continuation) -> None:
+        """Take over what was recorded before."""
+        self.done, self.kept = continuation.all_actions, continuation.completed_actions
+        self.times = [
+            (frame.role, frame.unit, frame.start_time)
+            for attempt in continuation.record.completed().values()
+            for frame in attempt.frames
+        ]
 
     def acted(
         self,
@@ -275,11 +325,14 @@ class _PlanRecorder:
     ) -> None:
         self._add(Step(start_s, self.unit, device, action), late_s)
         begin, end = self.clock.wall(start_s), self.clock.wall(end_s)
-        self.done.append(ActionRecord(self.unit, device, action, begin, end, late_s, task))
+        record = ActionRecord(self.unit, device, action, begin, end, late_s, task)
+        self.done.append(record)
+        self.kept.append(record)
 
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         action, exposure_s = f"{role} frame, {frame.settings}", frame.settings.exposure_s
         self._add(Step(frame.start_s, self.unit, CAMERA.key, action, exposure_s), late_s)
+        self.times.append((role, self.unit, self.clock.wall(frame.start_s)))
 
     def spectrum(
         self, role: str, reading: SpectrometerReading, start_s: float, end_s: float, late_s: float
@@ -302,8 +355,11 @@ class _PlanRecorder:
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return ()
 
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        return [(unit, time) for its_role, unit, time in self.times if its_role == role]
+
     def actions(self, device: str) -> Sequence[ActionRecord]:
-        return ()
+        return [action for action in self.kept if action.device == device]
 
     def all_actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self.done if action.device == device]
@@ -312,6 +368,7 @@ class _PlanRecorder:
         return when_planned
 
     def seed(self) -> int:
+        self.drawn.add(self.unit)
         return zlib.crc32(self.unit.encode())
 
     def doing(self, what: str, until_s: float | None = None) -> None:

@@ -16,7 +16,6 @@ from labrig.foundation.clock import Clock
 from labrig.foundation.quantity import duration_text
 from labrig.optics import SpectrometerReading
 from labrig.record import (
-    CLOCK_STEPPED,
     PC_CLOCK,
     UNDONE,
     ActionRecord,
@@ -25,6 +24,7 @@ from labrig.record import (
     RunFolder,
     SpectrumRecord,
     TemperatureRecord,
+    clock_stepped,
 )
 
 T = TypeVar("T")
@@ -224,7 +224,7 @@ class _Recorder:
             direction = "ahead" if step_s > 0 else "back"
             text = f"set {direction} by {duration_text(abs(step_s))}"
             self.acted(PC_CLOCK, text, now_s, now_s, 0.0)
-            self._observer.warn(CLOCK_STEPPED.format(text))
+            self._observer.warn(str(clock_stepped(text)))
 
     def take_back(self) -> None:
         """Record that the unit of the last manual step no longer counts, and abort this attempt."""
@@ -264,6 +264,9 @@ class _Recorder:
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
         return [frame for frame in self.kept_frames if frame.role == role]
+
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        return [(frame.unit, frame.start_time) for frame in self.frames(role)]
 
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return [spectrum for spectrum in self.kept_spectra if spectrum.role == role]

@@ -75,6 +75,9 @@ class Recorder(Protocol):
     def frames(self, role: str) -> Sequence[FrameRecord]:
         """Return the frames with a role, those of completed units before those of this one."""
 
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        """Return unit and begin of each of these frames, in a plan those that it lays out, too."""
+
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         """Return the spectra with a role, those of completed units before those of this one."""
 
@@ -306,6 +309,10 @@ class Session:
         """Return the frames taken with a role, in completed units and in this one so far."""
         return self._recorder.frames(role)
 
+    def frame_times(self, role: str) -> list[float]:
+        """Return the begins of these frames in seconds since 1970, in a plan the planned ones."""
+        return [time for _, time in self._recorder.frame_times(role)]
+
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         """Return the spectra read with a role, in completed units and in this one so far."""
         return self._recorder.spectra(role)
@@ -463,6 +470,10 @@ class _PartRecorder:
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
         return self._records_of_part(self._recorder.frames(role))
+
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        units = ((unit_within(self._part, u), t) for u, t in self._recorder.frame_times(role))
+        return [(unit, time) for unit, time in units if unit is not None]
 
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return self._records_of_part(self._recorder.spectra(role))

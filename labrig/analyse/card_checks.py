@@ -1,7 +1,7 @@
 """Checks of lights by what card and samples show, and what to know before a matrix is used."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,14 @@ from labrig.fit.leds import ChannelMatch, match_channels
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError
-from labrig.foundation.number_format import plus_minus
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    Extrapolated,
+    Misfit,
+    ResultWarning,
+    Unmeasured,
+)
 from labrig.material import physical_warnings
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 from labrig.results import Measured
@@ -29,21 +36,26 @@ LEFT = 0.002
 BLEACHED, BLEACHED_SIGMA = 0.02, 3.0
 
 
-def exchanged_warnings(places: Mapping[str, str], kind: LightKind = "LED") -> Iterator[str]:
-    """Yield a line if lights are lit in one another's places, by the one that is lit for each."""
+def exchanged_warnings(
+    places: Mapping[str, str], kind: LightKind = "LED"
+) -> Iterator[ResultWarning]:
+    """Yield a warning if lights are lit in one another's places."""
     if places:
-        which = ", ".join(f"{light} for {name}" for name, light in places.items())
-        yield (
-            f"{', '.join(places)}: expected {kind}s in the order of their names, got others by the "
-            f"card's colour ({which}); the frames count as those of the {kind} that was lit: "
-            "correct the rig file before the next run"
+        yield Contradiction(
+            "lights-exchanged",
+            "expected {kind}s in the order of their names, got others by the card's colour "
+            "({exchanged}); the frames count as those of the {kind} that was lit: correct the rig "
+            "file before the next run",
+            subject=", ".join(places),
+            kind=kind,
+            exchanged=tuple(f"{light} for {name}" for name, light in places.items()),
         )
 
 
 def left_warnings(
     what: str, patches: Mapping[str, LitPatch], lights: Sequence[str], kind: LightKind = "LED"
-) -> Iterator[str]:
-    """Yield a line if patches are bright after some light of a kind."""
+) -> Iterator[ResultWarning]:
+    """Yield a warning if patches are bright after some light of a kind."""
     counted, most = np.zeros(len(lights), dtype=np.bool_), {}
     for name, patch in patches.items():
         brightest = patch.value.max(axis=1, keepdims=True)
@@ -52,12 +64,18 @@ def left_warnings(
             most[name] = float((patch.off / brightest)[counts].max())
             counted |= counts.any(axis=1)
     if most:
-        which = ", ".join(name for name, counts in zip(lights, counted, strict=True) if counts)
         worst = max(most, key=lambda name: most[name])
-        yield (
-            f"{what}: with all {kind}s off there was light after {which}, up to {most[worst]:.1%} "
-            f"of that with the {kind} ({worst}); it is subtracted: something glows, another light "
-            f"is on, or {one_of(kind)} stays lit"
+        yield Disturbance(
+            "light-left",
+            "with all {kind}s off there was light after {lights}, up to {most:.1%} of that with "
+            "the {kind} ({worst}); it is subtracted: something glows, another light is on, or "
+            "{a_light} stays lit",
+            subject=what,
+            kind=kind,
+            lights=tuple(name for name, counts in zip(lights, counted, strict=True) if counts),
+            most=most[worst],
+            worst=worst,
+            a_light=one_of(kind),
         )
 
 
@@ -66,55 +84,118 @@ def one_of(kind: LightKind) -> str:
     return f"an {kind}" if kind == "LED" else f"a {kind}"
 
 
-def bleaching_warnings(name: str, bleaching: Measured | None) -> Iterator[str]:
-    """Yield a line if a sample changed under the light."""
+def bleaching_warnings(name: str, bleaching: Measured | None) -> Iterator[ResultWarning]:
+    """Yield a warning if a sample changed under the light."""
     if bleaching is None:
         return
     change = bleaching.value - 1
     if abs(change) > BLEACHED and abs(change) > BLEACHED_SIGMA * bleaching.sigma:
-        yield (
-            f"{name}: at the end of the run the first LED gave "
-            f"{plus_minus(bleaching.value, bleaching.sigma)} of what it gave at its begin; the "
-            "sample bleaches, or the LED drifts"
+        yield Disturbance(
+            "sample-bleached",
+            "at the end of the run the first LED gave {ratio.plus_minus} of what it gave at its "
+            "begin; the sample bleaches, or the LED drifts",
+            subject=name,
+            ratio=bleaching,
         )
 
 
-def per_led_warnings(name: str, fit: FluorescenceFit) -> Iterator[str]:
-    """Yield a line if no surface can have the matrix of one LED by itself, which nothing bounds."""
+def per_led_warnings(name: str, fit: FluorescenceFit) -> Iterator[ResultWarning]:
+    """Yield a warning if no surface can have the matrix that one LED after another gives."""
     try:
         physical_warnings(fit.matrix)
     except DataError as error:
-        yield (
-            f"{name}: the method per-led gives a matrix that no surface has, and other commands "
-            f"refuse its file ({error}); take --method joint"
+        yield Contradiction(
+            "matrix-unphysical",
+            "the method per-led gives a matrix that no surface has, and other commands refuse its "
+            "file ({reason}); take --method joint",
+            subject=name,
+            reason=str(error),
         )
 
 
-def fact_warnings(name: str, fit: FluorescenceFit, channels: Sequence[str]) -> Iterator[str]:
-    """Yield a line for each fact of an estimate."""
-    for fact in fit.facts:
-        match fact:
-            case ExtrapolatedExcitation(input_nm, share):
-                yield (
-                    f"{name}: {share:.0%} of the re-radiation under equal light is excited between "
-                    f"{min(input_nm):g} nm and {max(input_nm):g} nm where no LED shone: it is "
-                    "extrapolated"
-                )
-            case UnknownBrightness(lights):
-                yield (
-                    f"{name}: how bright {', '.join(lights)} shone is not known, so that of what "
-                    "they excite only the colour is; measure them with led_brightness"
-                )
-            case UnexplainedValues(reduced_chi2, light, channel, sigmas):
-                yield (
-                    f"{name}: no matrix explains the values (reduced χ² {reduced_chi2:.1f}); under "
-                    f"{light} channel {channels[channel]} is {sigmas:.1f} σ off"
-                )
-            case MoreThanWhite(input_nm, fraction, sigma):
-                yield (
-                    f"{name}: {plus_minus(fraction, sigma)} of the light of {input_nm:g} nm comes "
-                    "back, more than from a perfect white"
-                )
+def fact_warnings(
+    fits: Mapping[str, FluorescenceFit], input_nm: FloatArray, channels: Sequence[str]
+) -> Iterator[ResultWarning]:
+    """Yield warnings for the facts of estimates; of one that samples share, one for all.
+
+    Parameters
+    ----------
+    fits
+        Estimate of each sample.
+    input_nm
+        Middles of the input bands in nm, rising.
+    channels
+        Names of the camera's channels.
+    """
+    extrapolated: dict[str, ExtrapolatedExcitation] = {}
+    samples_of: dict[tuple[str, ...], list[str]] = {}
+    for name, fit in fits.items():
+        for fact in fit.facts:
+            if isinstance(fact, ExtrapolatedExcitation):
+                extrapolated[name] = fact
+            elif isinstance(fact, UnknownBrightness):
+                samples_of.setdefault(fact.lights, []).append(name)
+            else:
+                yield _fact_warning(name, fact, channels)
+    if extrapolated:
+        dark_nm = {nm for fact in extrapolated.values() for nm in fact.input_nm}
+        yield Extrapolated(
+            "excitation-extrapolated",
+            "of the re-radiation under equal light {shares} is excited at {gaps_nm} nm, where no "
+            "LED shone: that part is extrapolated",
+            shares=tuple(f"{fact.share:.0%} ({name})" for name, fact in extrapolated.items()),
+            gaps_nm=_gaps_nm(dark_nm, input_nm),
+            share={name: fact.share for name, fact in extrapolated.items()},
+        )
+    for lights, samples in samples_of.items():
+        yield Unmeasured(
+            "light-unscaled",
+            "the brightness of {lights} was not measured: the colour of the light that they "
+            "excite is determined, its amount is not; measure them with led_brightness",
+            subject=", ".join(samples),
+            lights=lights,
+        )
+
+
+def _gaps_nm(dark_nm: Collection[float], input_nm: FloatArray) -> tuple[str, ...]:
+    """Return the ranges of neighbouring bands that no light reached."""
+    gaps: list[list[float]] = []
+    is_open = False
+    for nm in input_nm.tolist():
+        if nm not in dark_nm:
+            is_open = False
+        elif is_open:
+            gaps[-1][1] = nm
+        else:
+            gaps.append([nm, nm])
+            is_open = True
+    return tuple(f"{low:g}" if low == high else f"{low:g} to {high:g}" for low, high in gaps)
+
+
+def _fact_warning(
+    name: str, fact: UnexplainedValues | MoreThanWhite, channels: Sequence[str]
+) -> ResultWarning:
+    match fact:
+        case UnexplainedValues(reduced_chi2, light, channel, sigmas):
+            return Misfit(
+                "matrix-misfit",
+                "no matrix explains the values (reduced χ² {reduced_chi2:.1f}); under {light} "
+                "channel {channel} is {most_sigmas:.1f} σ off",
+                subject=name,
+                reduced_chi2=reduced_chi2,
+                light=light,
+                channel=channels[channel],
+                most_sigmas=sigmas,
+            )
+        case MoreThanWhite(input_nm, fraction, sigma):
+            return Contradiction(
+                "more-than-white",
+                "{fraction.plus_minus} of the light of {input_nm:g} nm comes back, more than "
+                "from a perfect white",
+                subject=name,
+                fraction=Measured(fraction, sigma),
+                input_nm=input_nm,
+            )
 
 
 #: Part of the brightest LED's signal from which the camera is expected to see an LED.
@@ -135,13 +216,13 @@ class UnusedLed:
     led
         Its name.
     reason
-        What card or samples show, and what to do.
+        Warning of what card or samples show, and of what to do.
     light
         The one that is lit in its place, None if none is known.
     """
 
     led: str
-    reason: str
+    reason: ResultWarning
     light: str | None = None
 
 
@@ -154,21 +235,21 @@ class UsableLights:
     by_row
         The light that was lit, which need not be the one that was to be, by the row of its frames.
     left_out
-        A line for each reason to leave others out.
+        A warning of each reason to leave others out.
     exchanged
-        Lines on lights that have only changed places.
+        Warnings of lights that have only changed places.
     light_of
         The light that is lit in the place of each of these.
     """
 
     by_row: Mapping[int, str]
-    left_out: Sequence[str]
-    exchanged: Sequence[str]
+    left_out: Sequence[ResultWarning]
+    exchanged: Sequence[ResultWarning]
     light_of: Mapping[str, str]
 
     @property
-    def warnings(self) -> list[str]:
-        """All lines."""
+    def warnings(self) -> list[ResultWarning]:
+        """All warnings."""
         return [*self.left_out, *self.exchanged]
 
 
@@ -188,18 +269,18 @@ def usable_lights(
     out = {one.led for one in unused}
     return UsableLights(
         {row: light_of.get(name, name) for row, name in enumerate(names) if name not in out},
-        lines_of(unused),
+        left_out_warnings(unused),
         list(exchanged_warnings(light_of, kind)),
         light_of,
     )
 
 
-def lines_of(unused: Sequence[UnusedLed]) -> list[str]:
-    """Return a line for each reason, with the LEDs that have it."""
-    leds: dict[str, list[str]] = {}
+def left_out_warnings(unused: Sequence[UnusedLed]) -> list[ResultWarning]:
+    """Return a warning for each reason, about the LEDs that have it."""
+    leds: dict[ResultWarning, list[str]] = {}
     for one in unused:
         leds.setdefault(one.reason, []).append(one.led)
-    return [f"{', '.join(names)}: left out, {reason}" for reason, names in leds.items()]
+    return [reason.about(", ".join(names)) for reason, names in leds.items()]
 
 
 def exchanged(unused: Sequence[UnusedLed]) -> dict[str, str]:
@@ -269,26 +350,41 @@ def unused_leds(
 
 def _unlit(
     row: int, what: str, patches: Mapping[str, LitPatch], kind: LightKind, *, needs_light: bool
-) -> str | None:
+) -> ResultWarning | None:
     """Return what is amiss with a light on the patches, None if nothing is."""
     if any(patch.is_clipped[row] for patch in patches.values()):
-        return (
-            f"frames of the {what} clip at the shortest exposure; dim the {kind}, lower camera.iso "
-            "or close the aperture"
+        return Disturbance(
+            "light-clipped",
+            "left out, frames of the {target} clip at the shortest exposure; dim the {kind}, lower "
+            "camera.iso or close the aperture",
+            target=what,
+            kind=kind,
         )
     if any(patch.is_off_clipped[row] for patch in patches.values()):
-        return (
-            f"frames of the {what} clip with all {kind}s off; {one_of(kind)} stays lit, or another "
-            f"light is on: check the {kind}s' relays, darken the room"
+        return Disturbance(
+            "light-clipped-off",
+            "left out, frames of the {target} clip with all {kind}s off; {a_light} stays lit, or "
+            "another light is on: check the {kind}s' relays, darken the room",
+            target=what,
+            kind=kind,
+            a_light=one_of(kind),
         )
     if not needs_light:
         return None
     if not any(patch.is_seen[row] for patch in patches.values()):
-        return f"frames of the {what} are dark; the {kind} did not light: check its plug"
+        return Unmeasured(
+            "light-unlit",
+            "left out, frames of the {target} are dark; the {kind} did not light: check its plug",
+            target=what,
+            kind=kind,
+        )
     if not any(_goes_off(patch, row) for patch in patches.values()):
-        return (
-            f"frames of the {what} are as bright with all {kind}s off; the {kind} did not light or "
-            "stays lit: check its plug and its relay"
+        return Unmeasured(
+            "light-stays",
+            "left out, frames of the {target} are as bright with all {kind}s off; the {kind} did "
+            "not light or stays lit: check its plug and its relay",
+            target=what,
+            kind=kind,
         )
     return None
 
@@ -309,17 +405,30 @@ def _is_rather(match: ChannelMatch, led: str, named: str) -> bool:
 
 
 def _odd(led: str, other: str | None, pair: str | None, kind: LightKind) -> UnusedLed:
+    reason: ResultWarning
     if other is not None:
-        reason = (
-            f"the card has the colour of {other}; correct the order of the {kind}s in the rig file"
+        reason = Contradiction(
+            "light-is-another",
+            "left out, the card has the colour of {other}; correct the order of the {kind}s in the "
+            "rig file",
+            other=other,
+            kind=kind,
         )
     elif pair is not None:
-        reason = f"the card has the colour of two {kind}s, {pair} is lit, too; check their relays"
+        reason = Disturbance(
+            "two-lights",
+            "left out, the card has the colour of two {kind}s, {other} is lit, too; check their "
+            "relays",
+            other=pair,
+            kind=kind,
+        )
     else:
-        keys = "'centre' and 'fwhm'" if kind == "LED" else "'spectrum' and 'filter'"
-        reason = (
-            f"the card has another colour than under this {kind}; correct its {keys} in the rig "
-            "file"
+        reason = Contradiction(
+            "light-colour-differs",
+            "left out, the card has another colour than under this {kind}; correct its {keys} in "
+            "the rig file",
+            kind=kind,
+            keys="'centre' and 'fwhm'" if kind == "LED" else "'spectrum' and 'filter'",
         )
     return UnusedLed(led, reason, other)
 

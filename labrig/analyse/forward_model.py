@@ -20,6 +20,7 @@ from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.optics import (
     Bands,
     CameraResponse,
@@ -207,8 +208,8 @@ class LvfModel(ForwardModel):
 
 def forward_models(
     context: AnalysisContext, frame: SeriesFrame, patches: Sequence[StripPatch] | None = None
-) -> tuple[dict[StripPatch, LvfModel], tuple[str, ...]]:
-    """Return the model of every patch of a part, and the reasons for patches without one.
+) -> tuple[dict[StripPatch, LvfModel], tuple[ResultWarning, ...]]:
+    """Return the model of every patch of a part, and warnings of patches without one.
 
     Parameters
     ----------
@@ -250,7 +251,7 @@ def forward_models(
 
 def with_white_reference(
     model: ForwardModel, context: AnalysisContext, white: FilterFrames | None
-) -> tuple[ForwardModel, tuple[str, ...]]:
+) -> tuple[ForwardModel, tuple[ResultWarning, ...]]:
     """Condition the model on frames of the grey card, if there are any; return it with warnings.
 
     Raises
@@ -263,13 +264,21 @@ def with_white_reference(
     optics = context.rig.optics
     if optics.lamp is None or optics.grey_card is None:
         return model, (
-            "the white picture says nothing, since the spectra of lamp and grey card are not "
-            "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
+            Unmeasured(
+                "white-picture-unused",
+                "the white picture is not used, since the spectra of lamp and grey card are not "
+                "known: name them in the rig file (optics: {{lamp: …, grey_card: …}})",
+            ),
         )
     light = card_light(lamp_spectrum(context.rig), card_reflectance(context.rig))
     white_frame = combined(white)
     if not white_frame.shows_light:
-        return model, ("the white picture is dark or clips throughout; the spectrum does without",)
+        return model, (
+            Unmeasured(
+                "white-picture-dark",
+                "the white picture is dark or clips throughout; the spectrum does without",
+            ),
+        )
     system = conditioned_on_white(
         model.system, white_frame.value, white_frame.sigma, light, model.expected_of(light)
     )

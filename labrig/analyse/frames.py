@@ -16,6 +16,7 @@ from labrig.calibration import BlankFile, CameraFile
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.foundation.region import Region, region_pixels
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Unmeasured
 from labrig.record import Attempt, FileRecord, FrameRecord, FrameRole, RunRecord, damaged_frames
 from labrig.reduce import SensorLayout, SeriesFrame, read_exif
 from labrig.results import Series, add_flag
@@ -194,12 +195,12 @@ class IntactFrames:
     decay: list[SeriesFrame]
     dark: list[SeriesFrame]
     daylight: list[FrameRecord]
-    warnings: list[str]
+    warnings: list[ResultWarning]
 
 
 def without_stray_light(
     frames: IntactFrames, blank: BlankFile | None
-) -> tuple[IntactFrames, tuple[str, ...]]:
+) -> tuple[IntactFrames, tuple[ResultWarning, ...]]:
     """Flag frames that begin before the blank is clean, and return the warnings about them.
 
     Stray light cannot be subtracted: the sample reflects another part of the lamp's afterglow than
@@ -212,7 +213,7 @@ def without_stray_light(
     """
     if blank is None:
         return frames, ()
-    left_out = left_out_lines([frame.t_s for frame in frames.decay], blank)
+    left_out = left_out_warnings([frame.t_s for frame in frames.decay], blank)
     kept = [
         frame if blank.is_clean(frame.t_s) else replace(frame, flag=add_flag(frame.flag, AFTERGLOW))
         for frame in frames.decay
@@ -220,7 +221,7 @@ def without_stray_light(
     return replace(frames, decay=kept), (*left_out, *blank.leaks())
 
 
-def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
+def left_out_warnings(t_s: Sequence[float], blank: BlankFile) -> tuple[ResultWarning, ...]:
     """Return warnings about frames that begin before the blank is clean.
 
     Parameters
@@ -245,9 +246,15 @@ def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
             "or use a shield"
         )
     return (
-        f"frames that begin before the bench is dark are left out, {len(early)} of {len(t_s)}: by "
-        f"the blank it is dark from {blank.first_clean_s:.3g} s after lamp off on (begin later, or "
-        "use a shield)",
+        Disturbance(
+            "frames-before-dark",
+            "frames that begin before the bench is dark are left out, {left_out} of {frames}: by "
+            "the blank it is dark from {dark_from_s:.3g} s after lamp off on (begin later, or use "
+            "a shield)",
+            left_out=len(early),
+            frames=len(t_s),
+            dark_from_s=blank.first_clean_s,
+        ),
     )
 
 
@@ -295,7 +302,12 @@ def intact_frames(
         ],
         daylight=[frame for frame in run.frames(FrameRole.DAYLIGHT) if frame not in damaged],
         warnings=[
-            f"{frame.path.name} {damage}; the report does without it"
+            Disturbance(
+                "photograph-damaged",
+                "{file} {damage}; the report does without it",
+                file=frame.path.name,
+                damage=damage,
+            )
             for frame, damage in damaged.items()
             if frame.role == FrameRole.DAYLIGHT
         ],
@@ -318,20 +330,29 @@ def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[Serie
     ]
 
 
-def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[str]:
+def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[ResultWarning]:
     """Return warnings about irregular times in the journal."""
-    warnings = []
+    warnings: list[ResultWarning] = []
     if run.torn:
         warnings.append(
-            "the journal's last line is torn: labrig was cut off while writing it; what it would "
-            "have said does not count"
+            Disturbance(
+                "journal-torn",
+                "the journal's last line is torn: labrig was cut off while writing it; what it "
+                "would have said does not count",
+            )
         )
     late = [frame for frame in run.frames(role) if frame.late_s > LATE_S]
     if late:
         latest = max(late, key=lambda frame: frame.late_s)
         warnings.append(
-            f"{len(late)} frames began late, {latest.path.name} by {latest.late_s:.2f} s; their "
-            "measured times are used (leave more time between frames)"
+            Disturbance(
+                "frames-late",
+                "{count} frames began late, {latest} by {late_s:.2f} s; their measured times are "
+                "used (leave more time between frames)",
+                count=len(late),
+                latest=latest.path.name,
+                late_s=latest.late_s,
+            )
         )
     return warnings
 
@@ -400,8 +421,8 @@ def glare_warning(
     regions: Mapping[str, Region],
     frame: Series,
     layout: SensorLayout,
-) -> tuple[str, ...]:
-    """Return one line that names the patches for which a usual glare matters; empty for none.
+) -> tuple[ResultWarning, ...]:
+    """Return a warning that names the patches for which a usual glare matters; empty for none.
 
     Parameters
     ----------
@@ -421,10 +442,17 @@ def glare_warning(
         return ()
     largest = max(matters, key=lambda name: matters[name])
     return (
-        f"the light of the rest of the frame may veil {', '.join(matters)}: a veiling glare of "
-        f"{100 * USUAL_GLARE:.0f} %, as lenses have, would be up to {100 * matters[largest]:.2g} % "
-        f"of {largest}'s signal; measure it with camera_calibration (black:), or photograph dim "
-        "patches without bright ones",
+        Unmeasured(
+            "glare-unmeasured",
+            "the light of the rest of the frame may veil {patches}: a veiling glare of "
+            "{glare_percent:.0f} %, as lenses have, would be up to {most_percent:.2g} % of "
+            "{most_veiled}'s signal; measure it with camera_calibration (black:), or photograph "
+            "dim patches without bright ones",
+            patches=tuple(matters),
+            glare_percent=100 * USUAL_GLARE,
+            most_percent=100 * matters[largest],
+            most_veiled=largest,
+        ),
     )
 
 

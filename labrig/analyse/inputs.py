@@ -11,8 +11,10 @@ from labrig.analyse.overrides import Overrides
 from labrig.analyse.process_options import OptionsT, chosen_options
 from labrig.bench_optics import calibration
 from labrig.calibration import CalibrationKind, kinds
+from labrig.foundation.activity import counted
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.plugins import measurement
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.material import Material
 from labrig.record import RunRecord
 from labrig.results import EmissionSpectrum, FittedDecay, RunResult
@@ -142,7 +144,7 @@ class AnalysedParts:
     results: Mapping[str, RunResult]
     failed: Mapping[str, str]
     inputs: Mapping[str, Inputs]
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
 
 def analyse_parts(context: AnalysisContext) -> AnalysedParts:
@@ -159,9 +161,9 @@ def analyse_parts(context: AnalysisContext) -> AnalysedParts:
     """
     results: dict[str, RunResult] = {}
     failures: dict[str, DataError | FitError] = {}
-    warnings: list[str] = []
+    warnings: list[ResultWarning] = []
     inputs = {"": context.inputs}
-    for link in context.protocol.chain():
+    for link in counted(context.protocol.chain(), "analysing parts"):
         kind = link.protocol.protocol
         analyse_link = measurement(kind, str(context.run.folder)).load("analysis")
         known = inputs.get(link.sample, inputs[""])
@@ -179,10 +181,12 @@ def analyse_parts(context: AnalysisContext) -> AnalysedParts:
                 raise FitError("; ".join(result.failures()))
         except (DataError, FitError) as error:
             failures[link.name] = error
-            warnings.append(f"{link.name}: {error}")
+            warnings.append(
+                Unmeasured("part-failed", "{reason}", subject=link.name, reason=str(error))
+            )
             continue
         results[link.name] = result
-        warnings += [f"{link.name}: {warning}" for warning in result.warnings]
+        warnings += [warning.about(link.name) for warning in result.warnings]
         inputs[link.sample] = known.updated_by(result)
     if not results:
         raise next(iter(failures.values()))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from labrig.acquire import CAMERA, RigFile, load_driver, shutter_text
 from labrig.analyse.overrides import Overrides
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import Contradiction, ResultWarning
 from labrig.optics import read_spectrometer_reading
 from labrig.record import FrameRecord, RunRecord, SpectrumRecord
 from labrig.reduce import Exif, frames_exif
@@ -115,7 +116,7 @@ def spectra_differences(spectra: Sequence[SpectrumRecord]) -> dict[SpectrumRecor
     return differences
 
 
-def clock_warnings(run: RunRecord) -> tuple[str, ...]:
+def clock_warnings(run: RunRecord) -> tuple[ResultWarning, ...]:
     """Return warnings about frames whose times differ from those of the camera's own clock.
 
     The two clocks are compared from one frame to the others, where they stand against each other
@@ -129,7 +130,7 @@ def clock_warnings(run: RunRecord) -> tuple[str, ...]:
 
     Returns
     -------
-    tuple of str
+    tuple of ResultWarning
         One warning with the largest excess and the first frames; empty if all agree.
 
     Examples
@@ -150,10 +151,15 @@ def clock_warnings(run: RunRecord) -> tuple[str, ...]:
     more = f" and {len(off) - _MAX_NAMED} more" if len(off) > _MAX_NAMED else ""
     allowed_s = CLOCK_SCATTER_S + max(reading.step_s for _, reading in off)
     return (
-        f"the times of {names}{more} in the journal differ from those by the camera's own clock, "
-        f"against the frames before, by up to {max(excess for excess, _ in off) + allowed_s:.2f} s "
-        f"where {allowed_s:.2f} s are usual: the camera's clock was set during the run, or the "
-        "journal was edited",
+        Contradiction(
+            "camera-clock-differs",
+            "the times of {frames} in the journal differ from those by the camera's own clock, "
+            "against the frames before, by up to {most_s:.2f} s where {usual_s:.2f} s are usual: "
+            "the camera's clock was set during the run, or the journal was edited",
+            frames=f"{names}{more}",
+            most_s=max(excess for excess, _ in off) + allowed_s,
+            usual_s=allowed_s,
+        ),
     )
 
 

@@ -14,9 +14,11 @@ import numpy as np
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND
+from labrig.foundation.activity import counted
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region, region_pixels
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.optics import SLICES, Strip
 from labrig.record import FrameRole
 from labrig.reduce import (
@@ -147,8 +149,8 @@ def strip_regions(context: AnalysisContext) -> list[StripPatch]:
 
 def slice_strip(
     patches: Sequence[StripPatch], strip: Strip, layout: SensorLayout, count: int = SLICES
-) -> tuple[dict[StripPatch, Slices], tuple[str, ...]]:
-    """Return the strip's slices in the rows of every patch, and the reason for patches without any.
+) -> tuple[dict[StripPatch, Slices], tuple[ResultWarning, ...]]:
+    """Return the strip's slices in the rows of every patch, and a warning of patches without any.
 
     Parameters
     ----------
@@ -171,9 +173,9 @@ def slice_strip(
         try:
             slices[patch] = _patch_slices(patch, strip, layout, count)
         except DataError as error:
-            reasons.append(str(error))
+            reasons.append(Unmeasured("patch-off-strip", "{reason}", reason=str(error)))
     if not slices:
-        raise DataError("; ".join(reasons))
+        raise DataError("; ".join(map(str, reasons)))
     return slices, tuple(reasons)
 
 
@@ -221,8 +223,8 @@ def tilt_offset(strip: Strip, slices: Slices, layout: SensorLayout) -> FloatArra
 
 def for_each_patch(
     patches: Sequence[StripPatch],
-    analyse: Callable[[StripPatch], tuple[Found, Sequence[str]]],
-) -> tuple[dict[str, Found], tuple[str, ...]]:
+    analyse: Callable[[StripPatch], tuple[Found, Sequence[ResultWarning]]],
+) -> tuple[dict[str, Found], tuple[ResultWarning, ...]]:
     """Analyse every patch, and return the results by the patch's folder, and warnings.
 
     A patch that cannot be analysed is a warning, as long as another one can.
@@ -233,16 +235,16 @@ def for_each_patch(
         No patch can be analysed.
     """
     results: dict[str, Found] = {}
-    warnings: list[str] = []
+    warnings: list[ResultWarning] = []
     failures: list[DataError] = []
-    for patch in patches:
-        prefix = "" if patch.alone else f"{patch.name}: "
+    for patch in counted(patches, "analysing patches"):
+        name = "" if patch.alone else patch.name
         try:
             results[patch.folder], patch_warnings = analyse(patch)
         except DataError as error:
-            failures.append(type(error)(f"{prefix}{error}"))
-            patch_warnings = [str(error)]
-        warnings += [f"{prefix}{warning}" for warning in patch_warnings]
+            failures.append(type(error)(f"{name}: {error}" if name else str(error)))
+            patch_warnings = [Unmeasured("patch-failed", "{reason}", reason=str(error))]
+        warnings += [warning.about(name) for warning in patch_warnings]
     if not results:
         raise failures[0]
     return results, tuple(warnings)

@@ -22,6 +22,7 @@ from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError, UsageError
 from labrig.foundation.quantity import FRACTION, parse
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.results import (
     AUTO,
     Series,
@@ -289,27 +290,37 @@ def _first_rows(series: Series, number: int) -> NDArray[np.intp]:
     return rows[np.argsort(series.t_s[rows], kind="stable")][:number]
 
 
-def _low_warnings(series: Series, low: LowStart | None) -> list[str]:
-    """Return what is said of first values that lie below the law of the others."""
+def _low_warnings(series: Series, low: LowStart | None) -> list[ResultWarning]:
+    """Return a warning about first values that lie below the law of the others."""
     if low is None:
         return []
     if low.is_ceiling:
         clipped = [row for row, flag in enumerate(series.flag) if CLIPPED in flag]
         rows = sorted(clipped, key=lambda row: series.t_s[row])[: low.number]
-        last = _clock_time(series, max(series.t_s[rows]))
         return [
-            f"the first {low.number} values, until {last}, are equal, "
-            f"{series.values[rows[0], 0]:.6g}, and lie below the law of the others: the detector "
-            "was saturated, and they were left out; measure them with less light or gain"
+            Disturbance(
+                "detector-clipped",
+                "the first {values} values, until {until_s:.12g} s, are equal, {level:.6g}, and "
+                "lie below the law of the others: the detector was saturated, and they were left "
+                "out; measure them with less light or gain",
+                values=low.number,
+                until_s=_clock_s(series, max(series.t_s[rows])),
+                level=series.values[rows[0], 0],
+            )
         ]
     first = _first_rows(series, low.number + 1)
-    which = "value lies" if low.number == 1 else f"{low.number} values lie"
-    until = "at" if low.number == 1 else "until"
     last_s, next_s = series.t_s[first[-2:]]
     return [
-        f"the first {which}, {until} {_clock_time(series, last_s)}, below the law of the others, "
-        f"by {low.sigmas:.0f} σ: was the detector saturated, or the lamp not off yet? Leave out "
-        f"what is wrong with '--from {series.clock.text(next_s)}'"
+        Disturbance(
+            "first-values-low",
+            "the first {values} value(s), until {until_s:.12g} s, lie below the law of the others, "
+            "by {sigmas:.0f} σ: was the detector saturated, or the lamp not off yet? Leave out the "
+            "wrong ones with '--from {next_time}'",
+            values=low.number,
+            until_s=_clock_s(series, last_s),
+            sigmas=low.sigmas,
+            next_time=series.clock.text(next_s),
+        )
     ]
 
 
@@ -414,17 +425,16 @@ def _refuse_rise(path: Path, series: Series) -> None:
     falls = smooth[highest] - smooth[-1] > RISE_FRACTION * rise
     if falls and rise > max(RISE_SIGMAS * noise, RISE_FRACTION * float(smooth[highest])):
         peak = highest + int(np.argmax(values[highest : highest + NEIGHBOURS]))
-        start = series.clock.text(t_s[peak])
+        start, until_s = series.clock.text(t_s[peak]), _clock_s(series, t_s[peak])
         raise FitError(
-            f"{path}: expected a signal that decays, got one that rises until "
-            f"{_clock_time(series, t_s[peak])}; fit what follows with '--from {start}', and say "
-            "with --origin when the light went off"
+            f"{path}: expected a signal that decays, got one that rises until {until_s:.12g} s; "
+            f"fit what follows with '--from {start}', and say with --origin when the light went off"
         )
 
 
-def _clock_time(series: Series, t_s: float) -> str:
-    """Return a time by the table's clock, for messages."""
-    return f"{float(series.clock.zero_s) + t_s:.12g} s"
+def _clock_s(series: Series, t_s: float) -> float:
+    """Return a time by the table's clock in seconds."""
+    return float(series.clock.zero_s) + t_s
 
 
 def _scatter_of_neighbours(values: FloatArray) -> float:

@@ -6,6 +6,7 @@ from itertools import groupby
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Unmeasured
 from labrig.material import Material, Provenance
 from labrig.record import (
     KNOWN_FOR_S,
@@ -28,7 +29,7 @@ ROOM_C = 21.0
 CHECK_IT = "check it before the next run (labrig rig check)"
 
 
-def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, ...]:
+def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[ResultWarning, ...]:
     """Warn of a temperature that changed while a sample glowed, and of a silent thermometer.
 
     Parameters
@@ -40,8 +41,8 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
 
     Returns
     -------
-    tuple of str
-        The warnings, a line each; empty if the temperature was steady or no thermometer was there.
+    tuple of ResultWarning
+        The warnings; empty if the temperature was steady or no thermometer was there.
 
     Examples
     --------
@@ -55,29 +56,44 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
     if not photographs or "thermometer" not in run.attempts[-1].start.get("devices", {}):
         return ()
     if not run.temperatures():
-        return (f"the thermometer gave no reading: {CHECK_IT}",)
-    course, warnings = TemperatureHistory(run), []
+        return (
+            Unmeasured(
+                "no-temperature", "the thermometer gave no reading: {remedy}", remedy=CHECK_IT
+            ),
+        )
+    course = TemperatureHistory(run)
+    warnings: list[ResultWarning] = []
     for part, group in groupby(photographs, key=lambda frame: frame.unit.rpartition("/")[0]):
         temperatures_c = course.during(list(group))
         if temperatures_c.size and np.ptp(temperatures_c) >= MOVED_K:
             change = relative_rate_change(temperatures_c.min(), temperatures_c.max())
-            glow = f"the glow of {part}" if part else "the glow"
             warnings.append(
-                f"the temperature moved by {np.ptp(temperatures_c):.1f} K while {glow} was "
-                f"photographed ({degrees_text(temperatures_c)}): k_r changes by about "
-                f"{100 * change:.0f} % over that, if traps are 0.65 eV deep; keep the room "
-                "steadier or measure for a shorter time"
+                Disturbance(
+                    "temperature-moved",
+                    "the temperature moved by {change_k:.1f} K while {glow} was photographed "
+                    "({temperatures}): k_r changes by about {rate_change:.0%} over that, if traps "
+                    "are 0.65 eV deep; keep the room steadier or measure for a shorter time",
+                    change_k=np.ptp(temperatures_c),
+                    glow=f"the glow of {part}" if part else "the glow",
+                    temperatures=degrees_text(temperatures_c),
+                    rate_change=change,
+                )
             )
     if photographs[-1].end_time > course.time[-1] + KNOWN_FOR_S:
         warnings.append(
-            f"the thermometer gave no reading after {time_text(course.time[-1])}: {CHECK_IT}"
+            Unmeasured(
+                "temperature-ends",
+                "the thermometer gave no reading after {last}: {remedy}",
+                last=time_text(course.time[-1]),
+                remedy=CHECK_IT,
+            )
         )
     return tuple(warnings)
 
 
 def drift_warnings(
     run: RunRecord, roles: Collection[str], rates: Iterable[Measured]
-) -> tuple[str, ...]:
+) -> tuple[ResultWarning, ...]:
     """Warn of a slow drift of the temperature that moves rates by more than their σ.
 
     While a sample glows for minutes its thermometer hardly shows a drift; the hour before does.
@@ -110,10 +126,17 @@ def drift_warnings(
     if not sigmas or change / 2 < min(sigmas):
         return ()
     return (
-        f"the temperature drifts by {3600 * slope:+.1f} K an hour, {moved_k:+.2g} K while the glow "
-        f"was photographed: k_r changes by about {100 * change:.1g} % over that, if traps are 0.65 "
-        f"eV deep, more than its σ of {100 * min(sigmas):.1g} %; rates are means over the decay, "
-        "keep the room steadier to know them better",
+        Disturbance(
+            "temperature-drifts",
+            "the temperature drifts by {drift_k_per_h:+.1f} K an hour, {change_k:+.2g} K while the "
+            "glow was photographed: k_r changes by about {rate_change_percent:.1g} % over that, if "
+            "traps are 0.65 eV deep, more than its σ of {rate_sigma_percent:.1g} %; rates are "
+            "means over the decay, keep the room steadier to know them better",
+            drift_k_per_h=3600 * slope,
+            change_k=moved_k,
+            rate_change_percent=100 * change,
+            rate_sigma_percent=100 * min(sigmas),
+        ),
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from typing import Any, Protocol, TypeVar
@@ -16,8 +16,10 @@ from labrig.acquire import (
     Camera,
     CameraCapabilities,
     Checkable,
+    Continuation,
     ExposureSettings,
     Plan,
+    PlanClock,
     ProtocolModel,
     Rig,
     RigFile,
@@ -28,6 +30,7 @@ from labrig.acquire import (
     run_units,
 )
 from labrig.bench.opening import Bench
+from labrig.bench.run_clock import ClockedObserver
 from labrig.bench.run_log import LoggedObserver
 from labrig.bench_optics import calibration
 from labrig.calibration import REFERENCE_KIND, ReferenceFile
@@ -45,7 +48,7 @@ from labrig.foundation.errors import (
 from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
-from labrig.record import ActionRecord, FrameRecord, RunFolder, RunRecord, damaged_frames
+from labrig.record import JOURNAL, ActionRecord, FrameRecord, RunFolder, RunRecord, damaged_frames
 from labrig.reduce import read_exif, read_raw
 
 ANEW = "calibrate the bench with this one (labrig run calibration), or use the other"
@@ -170,11 +173,9 @@ MAX_NAMED = 4
 
 
 class Watch(Protocol):
-    """Factory of a run's observer, from the plan, the units already complete and the clock."""
+    """Factory of a run's observer, from the clock of the plan and that of the rig."""
 
-    def __call__(
-        self, plan: Plan, done: Sequence[str], clock: Clock
-    ) -> AbstractContextManager[RunObserver]:
+    def __call__(self, plan_clock: PlanClock, clock: Clock) -> AbstractContextManager[RunObserver]:
         """Return the observer of one run."""
 
 
@@ -197,11 +198,13 @@ def execute(
     record = folder.read()
     done = record.completed()
     # More signals while the attempt is being closed must not cut that short.
-    with interrupting(bench.clock), watch(laid_out, list(done), bench.clock) as watching:
-        observer = LensObserver(watching, bench.file)
+    plan_clock = PlanClock(laid_out)
+    with interrupting(bench.clock), watch(plan_clock, bench.clock) as watching:
+        clocked = ClockedObserver(watching, plan_clock, bench.clock)
+        observer = LensObserver(clocked, bench.file)
         for unit in interrupted_units:
             observer.warn(f"the unit {unit} was cut off and is done again")
-        for oddity in _oddities(folder, record):
+        for oddity in [*_oddities(folder, record), *_changes(protocol, record)]:
             observer.warn(oddity)
         if record.last_time > bench.clock.wall() + CLOCK_STEP_S:
             observer.warn(
@@ -224,8 +227,15 @@ def execute(
 
         def use(rig: Rig) -> None:
             _refuse_what_spoils(rig)
-            if CAMERA in rig:
-                _refuse_what_the_camera_cannot(rig[CAMERA], protocol, folder, bench)
+            offers = _offers(rig, protocol, folder, bench)
+
+            def rest() -> tuple[Plan, RunRecord]:
+                record, wall = folder.read(), bench.clock.wall
+                goes_on = Continuation(record, wall(rig.connected_s), wall())
+                return plan(protocol, bench.file, bench.source, offers, goes_on), record
+
+            with _naming_own_files(folder):
+                clocked.connected(rest)
             _place_sample(protocol.sample_in_place, rig, observer)
             devices = rig.identities()
             require_calibrated_camera(bench.file, devices)
@@ -395,20 +405,29 @@ def _refuse_what_spoils(rig: Rig) -> None:
         raise ProtocolError("this would spoil the measurement: " + "; ".join(spoilers))
 
 
-def _refuse_what_the_camera_cannot(
-    camera: Camera, protocol: ProtocolModel, folder: RunFolder, bench: Bench
-) -> None:
-    """Raise `ProtocolError` if no plan is possible with what the connected camera offers.
+def _offers(
+    rig: Rig, protocol: ProtocolModel, folder: RunFolder, bench: Bench
+) -> CameraCapabilities | None:
+    """Return what the connected camera offers; None without a camera.
 
     The plan before the run had to believe the rig file. A real camera takes a trial frame, which
     shows whether the regions are inside of it: not after half an hour of warming up.
     """
-    try:
-        capabilities = camera.capabilities()
+    if CAMERA not in rig:
+        return None
+    with _naming_own_files(folder):
+        capabilities = rig[CAMERA].capabilities()
         is_certain = capabilities.frame_pixels is not None and bench.room is not None
         if protocol.named_regions() and not is_certain:
-            capabilities = offers_with_frame_size(camera)
-        plan(protocol, bench.file, bench.source, capabilities)
+            capabilities = offers_with_frame_size(rig[CAMERA])
+    return capabilities
+
+
+@contextmanager
+def _naming_own_files(folder: RunFolder) -> Iterator[None]:
+    """Name the run's own protocol and rig file if what they ask for is impossible."""
+    try:
+        yield
     except ProtocolError as error:
         if folder.read().attempts:
             files = " and ".join(str(folder.path / name) for name in ("protocol.yaml", "rig.yaml"))
@@ -447,7 +466,12 @@ def _report_exchanged_camera(
 
 
 def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
-    """Yield warnings about frames of a resumed run that disagree with the journal."""
+    """Yield warnings about the journal of a resumed run, and frames that disagree with it."""
+    if folder.was_torn:
+        yield (
+            f"{folder.path / JOURNAL}: its last line is incomplete, as a crash leaves it, and is "
+            "not used"
+        )
     if unknown := folder.unknown_files():
         yield (
             f"{folder.path / 'frames'}: the journal does not tell of {_listed(unknown)}, which a "
@@ -459,6 +483,23 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
         yield (
             f"{folder.path / 'frames'}: {_listed(texts)}; restore from a copy, or begin a new "
             "run: labrig process refuses them"
+        )
+
+
+def _changes(protocol: ProtocolModel, record: RunRecord) -> Iterator[str]:
+    """Yield warnings about a protocol file that is another than when the run began."""
+    now = {"protocol": protocol.protocol, "sample": protocol.sample.name}
+    for key, value in now.items():
+        if (before := record.began_with(key)) not in ("", value):
+            yield (
+                f"protocol.yaml was changed since the run began: its {key} is '{value}', in the "
+                f"journal it is '{before}'"
+            )
+    units = {unit.name for unit in protocol.units()}
+    if gone := [name for name in record.completed() if name not in units]:
+        yield (
+            f"protocol.yaml was changed since the run began: it no longer has the units "
+            f"{_listed(gone)}, which are complete"
         )
 
 

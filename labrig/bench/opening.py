@@ -3,7 +3,9 @@
 import os
 import re
 import socket
+import threading
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, wait
 from contextlib import (
     AbstractContextManager,
     ExitStack,
@@ -14,6 +16,7 @@ from contextlib import (
 )
 from dataclasses import dataclass, field
 from functools import partial
+from mmap import mmap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -40,7 +43,8 @@ from labrig.bench.device_lock import held, network_devices, serial_devices, usb_
 from labrig.bench.guard import Guard, guarding
 from labrig.bench.serial_ports import SerialPorts
 from labrig.consent import NETWORK_SCHEMES, calls, require_consent
-from labrig.foundation.clock import Clock, SystemClock
+from labrig.foundation.activity import checking
+from labrig.foundation.clock import CHECK_INTERVAL_S, Clock, SystemClock
 from labrig.foundation.errors import DeviceError, LabrigError, UsageError
 from labrig.foundation.named_files import with_absolute_paths
 from labrig.foundation.output_file import REAL_DISK, Disk
@@ -113,6 +117,8 @@ class Bench:
         with ExitStack() as stack:
             stack.enter_context(interrupting(self.clock))
             stack.enter_context(pausing(self.clock))
+            # A protocol that reduces its frames can be stopped between two of them.
+            stack.enter_context(checking(partial(self.clock.sleep, 0.0)))
             # Entered first, so that ports close after the devices on them are safe.
             transports = stack.enter_context(ExitStack())
             require_own_ports(self.file, self.source)
@@ -122,7 +128,7 @@ class Bench:
             stack.callback(rig.disconnect)
             stack.callback(self._make_safe, rig)
             # Freed first, so that lack of memory does not prevent the safe state.
-            stack.callback(bytearray(RESERVE_BYTES).clear)
+            stack.callback(mmap(-1, RESERVE_BYTES).close)
             opened = [key for key in self.file.devices if key not in self.left_out]
             for key in in_safe_order(opened):
                 rig.connect(key, partial(_open, self.file, key, connections, self.source))
@@ -412,7 +418,7 @@ class _Connections:
         host, port = _host_and_port(address, default_port)
         try:
             self._lock(network_devices(host, port), address)
-            connected = socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S)
+            connected = self._connected(host, port)
             # commands are small, and somebody waits for the answer to each
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except (OSError, UnicodeError) as error:
@@ -422,6 +428,22 @@ class _Connections:
             ) from None
         self._stack.callback(connected.close)
         return connected
+
+    def _connected(self, host: str, port: int) -> socket.socket:
+        """Return a connection; the system looks for it in a thread, so that Ctrl-C acts at once."""
+        attempt: Future[socket.socket] = Future()
+
+        def connect() -> None:
+            try:
+                attempt.set_result(socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S))
+            except Exception as error:
+                attempt.set_exception(error)
+
+        threading.Thread(target=connect, daemon=True).start()
+        while not attempt.done():
+            wait([attempt], CHECK_INTERVAL_S)
+            self.clock.sleep(0.0)
+        return attempt.result()
 
     def _find(self, address: str, serial_of: Callable[[Any], str] | None) -> Any:
         url = urlsplit(address)

@@ -28,7 +28,7 @@ from labrig.foundation import resources
 from labrig.foundation.errors import DiskError, MissingDeviceError, ProtocolError, UsageError
 from labrig.foundation.plugins import bench_check
 from labrig.foundation.yaml_file import yaml_text
-from labrig.record import CALIBRATIONS_FILE, RunFolder, RunSize, read_run, size_text
+from labrig.record import CALIBRATIONS_FILE, JOURNAL, RunFolder, RunSize, read_run, size_text
 
 #: Consequence of the lack of a curve, by its key under `optics:`.
 _CURVES = {
@@ -192,7 +192,12 @@ class Recording:
         return {CALIBRATIONS_FILE: yaml_text(record)} if record else {}
 
 
-def resume_run(path: Path, watch: Watch) -> Path:
+def _refuse(question: str) -> bool:
+    """Answer as somebody who is not there."""
+    return False
+
+
+def resume_run(path: Path, watch: Watch, confirm: Callable[[str], bool] = _refuse) -> Path:
     """Complete a run: units that were not finished are done, again if need be.
 
     Parameters
@@ -201,6 +206,8 @@ def resume_run(path: Path, watch: Watch) -> Path:
         The run's folder.
     watch
         What is told of steps and devices, and asked for what is done by hand.
+    confirm
+        Function that answers whether to record again what the journal has lost.
 
     Returns
     -------
@@ -210,7 +217,8 @@ def resume_run(path: Path, watch: Watch) -> Path:
     Raises
     ------
     UsageError
-        The path is not a run folder.
+        The path is not a run folder, or lines of its journal were lost and nobody confirmed to
+        record again what they were about.
     DiskError
         The disk has no room for the frames and results that are missing.
 
@@ -237,8 +245,36 @@ def resume_run(path: Path, watch: Watch) -> Path:
         RunFolder(path, bench.seed, bench.disk) as folder,
         run_log(path, rig.name, bench.clock),
     ):
+        _confirm_losses(folder, confirm)
         execute(folder, protocol, bench, run_plan, watch)
     return path
+
+
+def _confirm_losses(folder: RunFolder, confirm: Callable[[str], bool]) -> None:
+    """Ask whether to record again what was recorded, but has lost its lines in the journal.
+
+    Raises
+    ------
+    UsageError
+        Nobody confirmed it.
+    """
+    if not (lost := folder.lost_files()):
+        return
+    done = list(folder.read().completed())
+    kept = (
+        f"{len(done)} complete units are left in it, the last is {done[-1]}"
+        if done
+        else ("no complete unit is left in it")
+    )
+    loss = (
+        f"{folder.path / JOURNAL}: its end was lost: {len(lost)} frames have no line in it, "
+        f"{lost[0]} to {lost[-1]}; {kept}"
+    )
+    if not confirm(f"{loss}; go on and record the rest again?"):
+        raise UsageError(
+            f"{loss}; restore the journal from a copy, or record the rest again: labrig resume "
+            f"{folder.path} --yes"
+        )
 
 
 def _planned(protocol: ProtocolModel, path: Path, rig: RigFile, rig_path: Path) -> Plan:

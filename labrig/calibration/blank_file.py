@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from labrig.calibration.kind import CalibrationKind
 from labrig.foundation.errors import DataError
 from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 
 Row = tuple[Finite, ...]
 
@@ -97,9 +98,9 @@ class BlankFile(FrozenModel):
             )
         return t_s >= self.first_clean_s - SAME_TIME_S
 
-    def leaks(self) -> tuple[str, ...]:
-        """Return a message for each source of constant stray light."""
-        messages = []
+    def leaks(self) -> tuple[ResultWarning, ...]:
+        """Return a warning for each source of constant stray light."""
+        warnings = []
         for occasion, level, sigma in (
             ("after lamp off, but not in dark frames", self.constant_dn_per_s,
              self.constant_sigma_dn_per_s),
@@ -107,12 +108,18 @@ class BlankFile(FrozenModel):
         ):  # fmt: skip
             brightest = int(np.argmax(level))
             if level[brightest] > SIGNIFICANT * sigma[brightest]:
-                messages.append(
-                    f"light of {level[brightest]:.3g} ± {sigma[brightest]:.2g} DN/s in "
-                    f"{self.channels[brightest]} falls on the blank {occasion}: find where it "
-                    "leaks in"
+                warnings.append(
+                    Disturbance(
+                        "stray-light",
+                        "light of {light_dn_per_s:.3g} ± {sigma_dn_per_s:.2g} DN/s in {channel} "
+                        "falls on the blank {occasion}: find where it leaks in",
+                        light_dn_per_s=level[brightest],
+                        sigma_dn_per_s=sigma[brightest],
+                        channel=self.channels[brightest],
+                        occasion=occasion,
+                    )
                 )
-        return tuple(messages)
+        return tuple(warnings)
 
 
 BLANK_KIND = CalibrationKind(

@@ -7,6 +7,7 @@ from .compare import (
 from .index import (
     RunFilter as RunFilter,
     find_run as find_run,
+    indexed_summary as indexed_summary,
     list_runs as list_runs,
 )
 from .run_summary import (
@@ -20,4 +21,7 @@ from .summarising import (
 )
 from .trap_depths import (
     trap_depths as trap_depths,
+)
+from .unfinished import (
+    unfinished as unfinished,
 )

@@ -11,6 +11,7 @@ from scipy.special import chdtrc
 
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, DiskError, UsageError
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.foundation.yaml_file import did_you_mean, read_yaml
 from labrig.record import FrameRole, glow_temperature_c, read_run, relative_rate_change
 from labrig.results import (
@@ -193,15 +194,20 @@ class Comparison:
     temperatures_c: tuple[float | None, float | None]
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Doubts, a sentence each."""
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Limits of the comparison."""
         a, b = self.temperatures_c
         if a is None or b is None or abs(b - a) <= SAME_TEMPERATURE_K:
             return ()
-        change = 100 * relative_rate_change(a, b)
         return (
-            f"run B was measured at {b:.1f} °C, run A at {a:.1f} °C: k_r changes by about "
-            f"{change:+.0f} % over that, if traps are 0.65 eV deep".replace("-", "−"),
+            Disturbance(
+                "temperatures-differ",
+                "run B was measured at {b_c:.1f} °C, run A at {a_c:.1f} °C: k_r changes by about "
+                "{rate_change_percent:+.0f} % over that, if traps are 0.65 eV deep",
+                a_c=a,
+                b_c=b,
+                rate_change_percent=100 * relative_rate_change(a, b),
+            ),
         )
 
 

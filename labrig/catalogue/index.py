@@ -18,6 +18,7 @@ from typing import Any, Self
 from zlib import crc32
 
 from labrig.catalogue.run_summary import STATUSES, RunSummary
+from labrig.foundation.activity import counted
 from labrig.foundation.clock import SystemClock
 from labrig.foundation.errors import DiskError, LabrigError, UsageError
 from labrig.foundation.file_kind import RUN, require_kind, run_around
@@ -109,7 +110,7 @@ def read_summaries(runs: Path) -> list[RunSummary]:
     index, clock = _read_index(runs), SystemClock()
     entries: dict[str, _Entry] = {}
     lasting: dict[str, _Entry] = {}
-    for name in (path.name for path in runs.iterdir()):
+    for name in counted([path.name for path in runs.iterdir()], "reading runs"):
         if name in index and index[name].holds(f"{runs}/{name}"):
             entries[name] = lasting[name] = index[name]
         elif is_run(runs / name):
@@ -122,6 +123,34 @@ def read_summaries(runs: Path) -> list[RunSummary]:
         _write_index(runs, lasting)
     summaries = [entry.summary(runs / name).at_present() for name, entry in entries.items()]
     return sorted(summaries, key=lambda run: (run.made, run.folder.name))
+
+
+def indexed_summary(run: Path) -> RunSummary:
+    """Return the summary of a run, from the index of its folder where that holds.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+
+    Returns
+    -------
+    RunSummary
+        Summary of the run; it is made anew where the index has none, or an older one.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import indexed_summary
+    >>> indexed_summary(Path("runs/decay")).status
+    'processed'
+    """
+    entry = _read_index(run.parent).get(run.name)
+    if entry is None or not entry.holds(str(run)):
+        from labrig.catalogue.summarising import summarise
+
+        return summarise(run)
+    return entry.summary(run).at_present()
 
 
 def is_run(folder: Path) -> bool:

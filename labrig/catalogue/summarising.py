@@ -40,6 +40,9 @@ def summarise(folder: Path) -> RunSummary:
         has_journal = (folder / "journal.jsonl").exists()
         status: RunStatus = "damaged" if has_journal else "interrupted"
         return RunSummary(folder, sample, protocol, made, None, status, 0, number, 0, {})
+    # The files beside it may have been edited since.
+    sample = record.began_with("sample") or sample
+    protocol = record.began_with("protocol") or protocol
     completed = record.completed()
     status = status_of(record, is_complete=units is not None and set(units) <= set(completed))
     try:

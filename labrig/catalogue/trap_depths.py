@@ -48,8 +48,8 @@ def trap_depths(
     >>> from pathlib import Path
     >>> from labrig.catalogue import trap_depths
     >>> fast, slow = trap_depths([Path("runs/decay"), Path("runs/decay")], [15, 25])
-    >>> fast.depth.warnings[0].partition(":")[0]
-    'the rates do not rise with temperature (E = 0.000(16) eV)'
+    >>> fast.depth.warnings[0].code, str(fast.depth.depth_ev)
+    ('rates-not-thermal', '0.000(16) eV')
     """
     if temperatures_c is None:
         celsius = [_temperature_c(run) for run in runs]

@@ -2,7 +2,7 @@
 
 from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -26,7 +26,26 @@ from labrig.cli import (
 from labrig.cli.completion import complete_run
 from labrig.cli.process import ProcessCommand
 
+
+class ByPurpose(TyperGroup):
+    """Group of commands whose help lists them by what a person wants to do."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands, a section for each purpose in the order of registration."""
+        members = [(name, self.commands[name]) for name in self.list_commands(ctx)]
+        purposes = dict.fromkeys(getattr(member, "rich_help_panel", "") for _, member in members)
+        for purpose in purposes:
+            rows = [
+                (name, member.get_short_help_str(formatter.width))
+                for name, member in members
+                if getattr(member, "rich_help_panel", "") == purpose and not member.hidden
+            ]
+            with formatter.section(purpose):
+                formatter.write_dl(rows)
+
+
 app = typer.Typer(
+    cls=ByPurpose,
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -94,6 +113,15 @@ def schema(
     typer.echo(json.dumps(schema_of(kind), indent=2))
 
 
+def explain(
+    name: Annotated[str, typer.Argument(help="A key of a file, the code of a warning, or a term.")],
+) -> None:
+    """Explain a key of a file, the code of a warning, or a term of the glossary."""
+    from labrig.explain import explain as explain_name
+
+    typer.echo("\n\n".join(map(str, explain_name(name))))
+
+
 @optics_app.command("show")
 def show_curves(
     file: Annotated[str, typer.Argument(help="A file of curves, or a shipped camera.")],
@@ -147,31 +175,43 @@ def simulations() -> None:
     """Simulated devices for other programs."""
 
 
-app.command("run")(run.run)
-app.command("plan")(run.plan)
-app.command("resume")(run.resume)
-app.command("process", cls=ProcessCommand)(process.process)
-app.command("figures")(figures)
-app.command("frame")(frame)
-app.command("compare")(compare.compare)
-app.command("render")(render.render)
-app.command("note")(runs.note)
-app.command("design")(design.design)
-app.command("verify")(verify.verify)
-app.command("seal")(verify.seal)
-app.command("watch")(page.watch)
-app.command("schema")(schema)
-app.add_typer(protocol.driver_app, name="driver")
-app.add_typer(fit.app, name="fit")
-app.add_typer(verify.key_app, name="key")
-app.add_typer(leds.app, name="leds")
-app.add_typer(material.app, name="material")
-app.add_typer(optics_app, name="optics")
-app.add_typer(protocol.app, name="protocol")
-app.add_typer(queue.app, name="queue")
-app.add_typer(rig.app, name="rig")
-app.add_typer(runs.app, name="runs")
-app.add_typer(sim_app, name="sim")
+MEASURE = "Measure"
+app.command("plan", rich_help_panel=MEASURE)(run.plan)
+app.command("run", rich_help_panel=MEASURE)(run.run)
+app.command("resume", rich_help_panel=MEASURE)(run.resume)
+app.command("watch", rich_help_panel=MEASURE)(page.watch)
+app.add_typer(queue.app, name="queue", rich_help_panel=MEASURE)
+app.add_typer(protocol.app, name="protocol", rich_help_panel=MEASURE)
+
+EVALUATE = "Evaluate"
+app.command("process", cls=ProcessCommand, rich_help_panel=EVALUATE)(process.process)
+app.add_typer(fit.app, name="fit", rich_help_panel=EVALUATE)
+app.add_typer(runs.app, name="runs", rich_help_panel=EVALUATE)
+app.command("note", rich_help_panel=EVALUATE)(runs.note)
+app.command("figures", rich_help_panel=EVALUATE)(figures)
+app.add_typer(material.app, name="material", rich_help_panel=EVALUATE)
+
+REPRODUCE = "Reproduce and design"
+app.command("render", rich_help_panel=REPRODUCE)(render.render)
+app.command("compare", rich_help_panel=REPRODUCE)(compare.compare)
+app.command("design", rich_help_panel=REPRODUCE)(design.design)
+app.add_typer(leds.app, name="leds", rich_help_panel=REPRODUCE)
+
+KEEP = "Keep and prove"
+app.command("verify", rich_help_panel=KEEP)(verify.verify)
+app.command("seal", rich_help_panel=KEEP)(verify.seal)
+app.add_typer(verify.key_app, name="key", rich_help_panel=KEEP)
+
+BENCH = "Set up a bench"
+app.add_typer(rig.app, name="rig", rich_help_panel=BENCH)
+app.add_typer(optics_app, name="optics", rich_help_panel=BENCH)
+app.command("frame", rich_help_panel=BENCH)(frame)
+app.add_typer(sim_app, name="sim", rich_help_panel=BENCH)
+
+HELP = "Look up and extend"
+app.command("explain", rich_help_panel=HELP)(explain)
+app.command("schema", rich_help_panel=HELP)(schema)
+app.add_typer(protocol.driver_app, name="driver", rich_help_panel=HELP)
 
 
 @app.callback(invoke_without_command=True)

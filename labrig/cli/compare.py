@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labrig.cli.completion import complete_run
+from labrig.foundation.result_warning import ResultWarning, warning_lines
 
 if TYPE_CHECKING:
     from labrig.compare import DarkRoomScene, LampsComparison, RenderedComparison
@@ -87,7 +88,7 @@ def compare(
     folder, room = find_run(run, runs), None
     pages: tuple[Section, ...] = ()
     content: dict[str, Any] = {}
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
     if is_of_fluorescence(folder):
         _check_for_fluorescence(folder, rendered, material, assume_albedo, assume_scale)
         room = _of_lamps(folder, white, camera)
@@ -101,8 +102,8 @@ def compare(
     if json:
         _print_json(content if room is None else content | {"rendered": room.content})
         return
-    for line in warnings:
-        typer.echo(f"warning: {line}", err=True)
+    for line in warning_lines(warnings, "warning: "):
+        typer.echo(line, err=True)
     drawn = figures or folder / "comparison"
     for section in (*pages, *(() if room is None else room.sections)):
         _print_section(section)

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.page import NoBrowserOption, PortOption, announcing
+from labrig.foundation.activity import activity
+from labrig.foundation.clock import SystemClock
 
 if TYPE_CHECKING:
     from labrig.design import Wish
@@ -68,7 +70,8 @@ def design(
                 f"expected --constraints without {', '.join(given)}: the file says in which scene; "
                 "without --constraints a page is opened"
             )
-        _solve(constraints, out, picture, nearest)
+        with activity("designing"):
+            _solve(constraints, out, picture, nearest)
         return
     if out is not None or picture is not None or nearest:
         raise UsageError(
@@ -83,13 +86,10 @@ def design(
 def _serve(
     begin_with: Path | None, scene: str | None, material: str | None, port: int, no_browser: bool
 ) -> None:
-    from labrig.foundation.clock import SystemClock
-    from labrig.foundation.signals import interrupting
-    from labrig.studio import design_on_page
+    with announcing(no_browser) as announce:
+        from labrig.studio import design_on_page
 
-    clock = SystemClock()
-    with interrupting(clock):
-        design_on_page(begin_with, scene, material, port, clock, announcing(no_browser))
+        design_on_page(begin_with, scene, material, port, SystemClock(), announce)
 
 
 def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: bool) -> None:

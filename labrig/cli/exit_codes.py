@@ -1,13 +1,15 @@
 """End of a command: an exit code, and one line for an error."""
 
 import errno
-import os
 import re
 import signal
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING
 
+from labrig.cli.detachable_stream import DetachableStream
+from labrig.cli.under_way import showing_work
+from labrig.foundation.activity import checking
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import (
     DiskError,
@@ -18,38 +20,10 @@ from labrig.foundation.errors import (
     memory_shortage,
 )
 from labrig.foundation.readable_output import spelled
-from labrig.foundation.signals import STOP_SIGNALS, raise_interrupted
+from labrig.foundation.signals import STOP_SIGNALS, await_signals, raise_again
 
 if TYPE_CHECKING:
     from typer.exceptions import TyperException
-
-
-class DetachableStream:
-    """A stream that accepts text even when its reader has gone, so that a run continues."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-
-    def write(self, text: str) -> int:
-        """Write `text`; discard it if the reader has gone."""
-        try:
-            return self._stream.write(text)
-        except OSError:
-            self._drop_the_rest()
-            return len(text)
-
-    def flush(self) -> None:
-        """Flush the stream, if the reader has not gone."""
-        try:
-            self._stream.flush()
-        except OSError:
-            self._drop_the_rest()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
-
-    def _drop_the_rest(self) -> None:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
 
 
 #: Largest number of characters of a file name in a message.
@@ -108,10 +82,10 @@ def _run(arguments: Sequence[str]) -> int:
             f"{remedy}",
             2,
         )
-    for signum in STOP_SIGNALS:
-        signal.signal(signum, raise_interrupted)
+    await_signals()
     try:
-        command()(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
+        with showing_work(arguments), checking(raise_again):
+            command()(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
         return _print_error(str(interrupted), 128 + interrupted.signum)
     except LabrigError as error:

@@ -1,9 +1,6 @@
 """`labrig leds`: LEDs that a bench for fluorescent materials needs."""
 
 import shlex
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,8 +10,6 @@ from labrig.cli.material import Corrected, checked, read_fractions
 from labrig.foundation.errors import DataError, UsageError
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from labrig.fit.fluorescence import LedSet
     from labrig.material import ReradiationMatrix
 
@@ -94,6 +89,7 @@ def study(
         require_peaks,
         study_set,
     )
+    from labrig.foundation.activity import counted
     from labrig.optics import read_camera, read_light
     from labrig.report import ComparedLeds, describe_leds
 
@@ -115,22 +111,17 @@ def study(
         require_peaks(peaks_nm)
     surfaces, of_surfaces = _surfaces(matrices or [], corrected, every)
     sets: list[LedSet] = []
-    with _progress() as bar:
-        task = bar.add_task("", total=len(wanted))
-        for placement, peaks_nm in wanted:
-            bar.update(task, description=f"{len(peaks_nm)} LEDs, {placement}")
-            sets.append(study_set(placement, peaks_nm, response, surfaces, lights))
-            bar.advance(task)
-        if search:
-            best = {len(one.peaks_nm): one for one in sorted(sets, key=lambda one: -one.judged)}
-            for count, start in best.items():
-                found = start
-                for found in moved_leds(
-                    start, lambda nm: study_set("found", nm, response, surfaces, lights)
-                ):
-                    bar.update(task, description=f"search of {count} LEDs, {found.judged:.2f}")
-                if found is not start:
-                    sets.append(found)
+    for placement, peaks_nm in counted(wanted, "judging sets of LEDs"):
+        sets.append(study_set(placement, peaks_nm, response, surfaces, lights))
+    if search:
+        best = {len(one.peaks_nm): one for one in sorted(sets, key=lambda one: -one.judged)}
+        for start in counted(list(best.values()), "searching for better LEDs"):
+            *_, found = (
+                start,
+                *moved_leds(start, lambda nm: study_set("found", nm, response, surfaces, lights)),
+            )
+            if found is not start:
+                sets.append(found)
     sets.sort(key=lambda one: len(one.peaks_nm))
     compared = ComparedLeds(tuple(sets), response.name, of_surfaces)
     typer.echo(compared.to_json() if as_json else describe_leds(compared))
@@ -199,17 +190,3 @@ def _require_usable(file: str, surface: "ReradiationMatrix") -> None:
 
     if np.isnan(surface.reflectance).all():
         raise DataError(f"{file}: expected a measured reflectance, which a colour needs; got none")
-
-
-@contextmanager
-def _progress() -> "Iterator[Progress]":
-    """Yield a bar on a terminal's standard error, which is away at the end."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    console = Console(file=sys.stderr)
-    with Progress(
-        *columns, console=console, transient=True, disable=not sys.stderr.isatty()
-    ) as bar:
-        yield bar

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.foundation.result_warning import warning_lines
+
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
@@ -158,8 +160,8 @@ def checked(file: str, matrix: "ReradiationMatrix", is_corrected: bool) -> "Rera
         warnings = physical_warnings(matrix)
     except DataError as error:
         raise DataError(f"{file}: {error}") from None
-    for warning in warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    for line in warning_lines(warnings, "warning: "):
+        typer.echo(line, err=True)
     return matrix
 
 

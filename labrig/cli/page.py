@@ -1,6 +1,7 @@
 """`labrig watch` and `labrig rig view`: pages that are served to a browser on this PC."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,8 @@ import typer
 
 from labrig.cli.completion import complete_run
 from labrig.cli.default_rig import RigArgument, rig_path
+from labrig.foundation.activity import activity
+from labrig.foundation.clock import SystemClock
 
 PortOption = Annotated[
     int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
@@ -17,17 +20,24 @@ NoBrowserOption = Annotated[
 ]
 
 
-def announcing(no_browser: bool) -> Callable[[str], None]:
-    """Return what prints the address of a page and opens it in a browser, unless told not to."""
+@contextmanager
+def announcing(no_browser: bool) -> Iterator[Callable[[str], None]]:
+    """Yield what prints the address of a page and opens it in a browser, unless told not to.
 
-    def announce(url: str) -> None:
-        typer.echo(url)
-        if not no_browser:
-            import webbrowser
+    Until then the page is being made ready, which is work that takes long.
+    """
+    with ExitStack() as making_ready:
+        making_ready.enter_context(activity("making the page ready"))
 
-            webbrowser.open(url)
+        def announce(url: str) -> None:
+            making_ready.close()
+            typer.echo(url)
+            if not no_browser:
+                import webbrowser
 
-    return announce
+                webbrowser.open(url)
+
+        yield announce
 
 
 def view(
@@ -40,9 +50,10 @@ def view(
     no_browser: NoBrowserOption = False,
 ) -> None:
     """Live view for aiming and focus, regions drawn into a protocol. Ctrl-C ends it."""
-    from labrig.setup import view_rig
+    with announcing(no_browser) as announce:
+        from labrig.setup import view_rig
 
-    view_rig(rig_path(rig), protocol, port, announcing(no_browser))
+        view_rig(rig_path(rig), protocol, port, announce)
 
 
 def watch(
@@ -57,11 +68,8 @@ def watch(
     no_browser: NoBrowserOption = False,
 ) -> None:
     """A page for the screen outside the dark room: live decay, timeline, state. Ctrl-C ends it."""
-    from labrig.catalogue import find_run
-    from labrig.foundation.clock import SystemClock
-    from labrig.foundation.signals import interrupting
-    from labrig.watch import watch_run
+    with announcing(no_browser) as announce:
+        from labrig.catalogue import find_run
+        from labrig.watch import watch_run
 
-    clock = SystemClock()
-    with interrupting(clock):
-        watch_run(find_run(run, runs), port, clock, announcing(no_browser))
+        watch_run(find_run(run, runs), port, SystemClock(), announce)

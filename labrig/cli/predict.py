@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_material
+from labrig.foundation.result_warning import ResultWarning, Undetermined, warning_lines
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -76,15 +77,15 @@ def _print_prediction(prediction: "Prediction", duration_s: float) -> None:
     console = Console(highlight=False)
     for patch in prediction.patches:
         console.print(_states(prediction, patch))
-        for line in _doubts(prediction, patch):
-            console.print(f"! {line}", style="yellow")
+        for line in warning_lines(_warnings(prediction, patch)):
+            console.print(line, style="yellow", markup=False)
         if any(remedy.helps for remedy in prediction.remedies):
             console.print(_remedies(prediction, patch, duration_s))
     useless = [remedy.change.description for remedy in prediction.remedies if not remedy.helps]
     if useless:
         console.print(f"no help: {', '.join(useless)}")
-    for line in prediction.warnings:
-        console.print(f"! {line}", style="yellow")
+    for line in warning_lines(prediction.warnings):
+        console.print(line, style="yellow", markup=False)
     for line in prediction.notes:
         console.print(line, style="dim")
 
@@ -135,29 +136,43 @@ def _noise(predicted: "PatchPrediction", state: int) -> str:
     )
 
 
-def _doubts(prediction: "Prediction", patch: str) -> list[str]:
-    """Return warnings on states that the fit will not resolve, with a change that would help."""
-    predicted, doubts = prediction.patches[patch], []
+def _warnings(prediction: "Prediction", patch: str) -> list[ResultWarning]:
+    """Return warnings about states that the fit will not resolve, with a change that would help."""
+    predicted = prediction.patches[patch]
+    warnings: list[ResultWarning] = []
     if not predicted.resolves_all_states:
         sufficient = [
             remedy for remedy in prediction.remedies if remedy.patches[patch].resolves_all_states
         ]
         cheapest = min(sufficient, key=lambda remedy: remedy.extra_time_s, default=None)
         would = f"'{cheapest.change.description}' would" if cheapest else "nothing below is enough"
-        doubts.append(
-            f"the fit may not resolve these {len(predicted.rate_per_s)} states: it "
-            f"sees all of them with a chance of {100 * predicted.chance_of_all_states:.0f} %, and "
-            f"their rates {predicted.least_apart:.1f} σ from each other; {would}"
+        warnings.append(
+            Undetermined(
+                "states-unresolved",
+                "the fit may not resolve these {states} states: it detects all of them with a "
+                "chance of {chance_percent:.0f} %, and their rates {sigmas_apart:.1f} σ from each "
+                "other; {remedy}",
+                states=len(predicted.rate_per_s),
+                chance_percent=100 * predicted.chance_of_all_states,
+                sigmas_apart=predicted.least_apart,
+                remedy=would,
+            )
         )
     for i, rate in enumerate(predicted.rate_per_s):
         rate_sigma = predicted.rate_sigma_per_s[i] / rate
         amplitude_sigma = predicted.amplitude_sigma_dn_per_s[i] / predicted.amplitude_dn_per_s[i]
         if max(rate_sigma, amplitude_sigma) > HARDLY_KNOWN:
-            doubts.append(
-                f"state {i + 1} is hardly known: its rate to {_percent(rate_sigma)}, its amplitude "
-                f"to {_percent(amplitude_sigma)}"
+            warnings.append(
+                Undetermined(
+                    "rate-unresolved",
+                    "state {state} is hardly determined: its rate to {rate_sigma}, its amplitude "
+                    "to {amplitude_sigma}",
+                    state=i + 1,
+                    rate_sigma=_percent(rate_sigma),
+                    amplitude_sigma=_percent(amplitude_sigma),
+                )
             )
-    return doubts
+    return warnings
 
 
 def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table":

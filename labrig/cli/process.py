@@ -10,6 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from labrig.cli.completion import complete_run
+from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
     from labrig.analyse import Overrides, ProcessOptions
@@ -164,14 +165,16 @@ def process(
 
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
     """Process the run in the folder `run` and print its result."""
+    from labrig.foundation.activity import activity
     from labrig.process import process_and_report
 
-    processed = process_and_report(run, overrides)
+    with activity(f"processing {run.name}"):
+        processed = process_and_report(run, overrides)
     if json:
         typer.echo(processed.result.to_json())
         return
-    for warning in processed.result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    for line in warning_lines(processed.result.warnings, "warning: "):
+        typer.echo(line, err=True)
     for text in processed.lines:
         typer.echo(text)
     for number, line in enumerate(processed.changes):

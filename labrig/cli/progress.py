@@ -5,8 +5,9 @@ import queue
 import shutil
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
 from typing import TextIO, cast
 
@@ -19,28 +20,41 @@ from rich.style import Style
 from rich.table import Table
 from rich.text import Text
 
-from labrig.acquire import ExposureSettings, ManualStep, Plan, RunObserver
+from labrig.acquire import ExposureSettings, ManualStep, PlanClock, RunObserver, step_text
 from labrig.bench import logging_to
-from labrig.cli.exit_codes import DetachableStream
-from labrig.foundation.clock import Clock
+from labrig.cli.detachable_stream import DetachableStream
+from labrig.cli.under_way import hidden_work, work_text
+from labrig.foundation.activity import under_way
+from labrig.foundation.clock import Clock, SystemClock
 from labrig.foundation.errors import UsageError
 from labrig.foundation.quantity import duration_text
-from labrig.record import FrameRecord
+from labrig.record import PERSON, FrameRecord
 from labrig.watch import Previews, RenderedPreview
 
 #: Answer that undoes the previous step.
 UNDO = "undo"
 #: Period in which an interruption is looked for.
 CHECK_INTERVAL_S = 0.05
+#: Shortest time from one line to the next; nobody types faster.
+ANSWER_PERIOD_S = 0.05
+#: Time in which nobody does a step by hand, and how often in a row that shows that nobody does it.
+AT_ONCE_S, MAX_AT_ONCE = 0.5, 10
 
 
 class Terminal:
-    """Reader of lines from the terminal in a thread, so that a run can be interrupted."""
+    """Reader of lines from the terminal in a thread, so that a run can be interrupted.
+
+    Only lines that come while a question is open are answers, at most `1 / ANSWER_PERIOD_S` a
+    second: a program that writes without end fills no memory and keeps no run from its work.
+    """
 
     def __init__(self) -> None:
+        self._clock = SystemClock()
         self._lines: queue.Queue[str] = queue.Queue()
+        self._is_open = threading.Event()
         self._ended = threading.Event()
         self._reading = False
+        self._at_once = 0
 
     def ask(
         self, step: ManualStep, last: str | None, left_s: float, meanwhile: Callable[[], None]
@@ -53,14 +67,25 @@ class Terminal:
             If the input has ended without an answer.
         """
         self._read()
-        while not self._lines.empty():
-            self._lines.get()  # typed before the question
         offer = f", or: {UNDO} (do again: {last})" if last else ""
-        _print_line(f"by hand: {step.what}")
+        _print_line(step_text(PERSON, step.what))
         _print_line(f"  why: {step.why}; {duration_text(left_s)} of lab time left")
         _print_line(
             f"  Enter when it is done, or a remark{offer}; Ctrl-C stops, labrig resume goes on"
         )
+        asked_s = self._clock.now()
+        self._is_open.set()
+        try:
+            return self._answer(step, last, meanwhile)
+        finally:
+            self._is_open.clear()
+            while not self._lines.empty():
+                self._lines.get()
+            self._count(self._clock.now() - asked_s)
+
+    def _answer(
+        self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]
+    ) -> str | None:
         while True:
             line = self._next_line(meanwhile)
             if line is None:
@@ -75,6 +100,16 @@ class Terminal:
                 return None
             _print_line("  there is nothing to take back; Enter when it is done")
 
+    def _count(self, took_s: float) -> None:
+        """Say in one line that steps are confirmed as no person confirms them."""
+        self._at_once = self._at_once + 1 if took_s < AT_ONCE_S else 0
+        if self._at_once == MAX_AT_ONCE:
+            _print_line(
+                f"warning: {MAX_AT_ONCE} steps by hand in a row were confirmed within "
+                f"{duration_text(AT_ONCE_S)} each: no person does that, so nothing of it was done; "
+                "stop with Ctrl-C if the input is not from a keyboard"
+            )
+
     def _read(self) -> None:
         if not self._reading:
             self._reading = True
@@ -83,7 +118,9 @@ class Terminal:
     def _keep_reading(self, source: TextIO) -> None:
         with suppress(OSError, ValueError):  # it was closed, which is an end, too
             while line := source.readline():
-                self._lines.put(line)
+                if self._is_open.is_set():  # else it was typed before the question
+                    self._lines.put(line)
+                self._clock.sleep(ANSWER_PERIOD_S)
         self._ended.set()
 
     def _next_line(self, meanwhile: Callable[[], None]) -> str | None:
@@ -108,8 +145,7 @@ THUMBNAIL_WIDTH = 48
 
 @contextmanager
 def progress(
-    plan: Plan,
-    done: Sequence[str],
+    plan_clock: PlanClock,
     clock: Clock,
     *,
     yes: bool = False,
@@ -120,10 +156,8 @@ def progress(
 
     Parameters
     ----------
-    plan
-        Plan of the run, for the time left.
-    done
-        Names of units that are complete already.
+    plan_clock
+        Clock of the run's plan, for the time left and the next steps.
     clock
         Clock of the rig.
     yes
@@ -138,13 +172,14 @@ def progress(
     UsageError
         If `yes` is given for manual steps that only a person can do.
     """
-    if yes and plan.manual_steps and not has_changer:
+    by_hand = plan_clock.plan.manual_steps
+    if yes and by_hand and not has_changer:
         raise UsageError(
-            f"--yes: {len(plan.manual_steps)} steps are done by hand, such as "
-            f"'{plan.manual_steps[0]}', and the rig has no 'changer' to do them; run without "
-            "--yes, or on a simulated rig that has one: --rig sim-phosphor"
+            f"--yes: {len(by_hand)} steps are done by hand, such as '{by_hand[0]}', and the rig "
+            "has no 'changer' to do them; run without --yes, or on a simulated rig that has one: "
+            "--rig sim-phosphor"
         )
-    state = _State(plan, done, clock, yes=yes)
+    state = _State(plan_clock, clock, yes=yes)
     if verbose:
         with logging_to(logging.StreamHandler(DetachableStream(sys.stderr)), clock):
             yield LogProgress(state)
@@ -153,7 +188,7 @@ def progress(
         yield PlainProgress(state)
         return
     console = Console(file=cast(TextIO, DetachableStream(sys.stderr)))
-    with Live(console=console, refresh_per_second=4, transient=True) as live:
+    with hidden_work(), Live(console=console, refresh_per_second=4, transient=True) as live:
         observer = LiveProgress(state, live, console)
         try:
             yield observer
@@ -162,36 +197,32 @@ def progress(
 
 
 class _State:
-    """Progress of the run relative to its plan."""
+    """State of the run at its place in the plan."""
 
-    def __init__(self, plan: Plan, done: Sequence[str], clock: Clock, *, yes: bool) -> None:
-        self.plan = plan
+    def __init__(self, plan_clock: PlanClock, clock: Clock, *, yes: bool) -> None:
+        self.plan_clock = plan_clock
         self.clock = clock
-        self.done = set(done)
         self.unit = ""
-        self.number = 0
+        self.number = self.total = 0
         self.doing = "connecting"
         self.until_s: float | None = None
-        self.frames = 0
+        self._frames = 0
         self._terminal = None if yes else Terminal()
-        self._unit_began_s = clock.now()
 
-    def begin(self, unit: str, number: int) -> None:
-        if self.unit and number > self.number:  # else it was taken back
-            self.done.add(self.unit)
-        self.done.discard(unit)
-        self.unit, self.number = unit, number
-        self._unit_began_s = self.clock.now()
+    def begin(self, unit: str, number: int, total: int) -> None:
+        self.unit, self.number, self.total = unit, number, total
+
+    def count_frame(self) -> None:
+        self._frames += 1
+
+    def frames(self) -> str:
+        """Return the number of frames and the largest one."""
+        recorded = self.plan_clock.recorded_frames
+        return f"{recorded + self._frames} of {recorded + self.plan_clock.plan.frames}"
 
     def left_s(self) -> float:
-        """Return the planned lab time left in seconds; a unit that takes longer counts as over."""
-        left_s = 0.0
-        for name, begins_s, ends_s in self._spans():
-            if name == self.unit:
-                left_s += max(ends_s - begins_s - self._elapsed_s(), 0.0)
-            elif name not in self.done:
-                left_s += ends_s - begins_s
-        return left_s
+        """Return the planned lab time left in seconds."""
+        return self.plan_clock.left_s(self.clock.now())
 
     def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Ask the person at the terminal; without one, only let the time of the step pass."""
@@ -202,27 +233,19 @@ class _State:
 
     def next_step(self) -> str:
         """Return the next step of this unit in the plan, else the next unit."""
-        begins_s = next((b for name, b, _ in self._spans() if name == self.unit), 0.0)
-        now_s = begins_s + self._elapsed_s()
-        for step in self.plan.steps:
-            if step.unit == self.unit and step.at_s > now_s + 0.1:
-                what = (
-                    step.action
-                    if step.device in ("-", "camera")
-                    else f"{step.device} {step.action}"
-                )
-                return f"{what} in {_countdown(step.at_s - now_s)}"
-        following = self.plan.units[self.number :]
+        if due := self.plan_clock.next_due(self.clock.now()):
+            return f"{due.what} in {_countdown(due.in_s)}"
+        units = self.plan_clock.plan.units
+        following = units[units.index(self.unit) + 1 :] if self.unit in units else units
         return f"unit {following[0]}" if following else "the report"
 
-    def _elapsed_s(self) -> float:
-        return self.clock.now() - self._unit_began_s
-
-    def _spans(self) -> Iterator[tuple[str, float, float]]:
-        begins_s = 0.0
-        for name, ends_s in zip(self.plan.units, self.plan.unit_ends_s, strict=True):
-            yield name, begins_s, ends_s
-            begins_s = ends_s
+    def next_by_hand(self) -> str:
+        """Return when the next step by hand is due, by the clock on the wall; empty if none is."""
+        due = self.plan_clock.next_by_hand(self.clock.now())
+        if due is None or self._terminal is None:
+            return ""
+        time_of_day = datetime.fromtimestamp(self.clock.wall() + due.in_s).astimezone()
+        return f"next by hand at {time_of_day:%H:%M}: {due.what}"
 
 
 class PlainProgress:
@@ -233,20 +256,19 @@ class PlainProgress:
 
     def unit(self, name: str, number: int, total: int) -> None:
         """Print that a unit begins."""
-        self._state.begin(name, number)
-        self._print(f"unit {number} of {total}: {name}")
+        self._state.begin(name, number, total)
+        self._print(f"unit {number} of {total}: {name}{self._by_hand()}")
 
     def doing(self, what: str, until_s: float | None = None) -> None:
         """Print that a wait begins; actions without an end time are not printed."""
         if until_s is not None:
-            self._print(f"{what}; next: {self._state.next_step()}")
+            self._print(f"{what}; next: {self._state.next_step()}{self._by_hand()}")
 
     def frame(self, record: FrameRecord) -> None:
         """Print that a frame was recorded."""
-        self._state.frames += 1
+        self._state.count_frame()
         settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
-        number = f"frame {self._state.frames} of {self._state.plan.frames}"
-        self._print(f"{number}: {record.role}, {settings}")
+        self._print(f"frame {self._state.frames()}: {record.role}, {settings}")
 
     def warn(self, text: str) -> None:
         """Print a warning."""
@@ -254,8 +276,12 @@ class PlainProgress:
 
     def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Print a step to be done by hand, and ask the person to do it."""
-        self._print(f"by hand: {step.what}")
+        self._print(step_text(PERSON, step.what))
         return self._state.ask(step, last, meanwhile)
+
+    def _by_hand(self) -> str:
+        due = self._state.next_by_hand()
+        return f"; {due}" if due else ""
 
     def _print(self, text: str) -> None:
         time_left = _countdown(self._state.left_s())
@@ -276,14 +302,13 @@ class LiveProgress:
         self._state = state
         self._live = live
         self._console = console
-        self._total = len(state.plan.units)
         self._run: Path | None = None
         self._previews: Previews | None = None
         live.update(self)
 
     def unit(self, name: str, number: int, total: int) -> None:
         """Note that a unit begins."""
-        self._state.begin(name, number)
+        self._state.begin(name, number, total)
 
     def doing(self, what: str, until_s: float | None = None) -> None:
         """Note that an action or a wait begins."""
@@ -291,7 +316,7 @@ class LiveProgress:
 
     def frame(self, record: FrameRecord) -> None:
         """Note that a frame was recorded, and request its preview from another process."""
-        self._state.frames += 1
+        self._state.count_frame()
         if self._previews is None:
             self._run = record.path.parents[1]
             self._previews = Previews(self._run, THUMBNAIL_WIDTH)
@@ -324,13 +349,17 @@ class LiveProgress:
     def _table(self, preview: RenderedPreview | None) -> Table:
         state = self._state
         table = Table.grid(padding=(0, 2))
-        table.add_row(_dim("unit"), f"{state.unit}  ({state.number} of {self._total})")
+        table.add_row(_dim("unit"), f"{state.unit}  ({state.number} of {state.total})")
         countdown = ""
         if state.until_s is not None:
             countdown = f"  ({_countdown(state.until_s - state.clock.now())} to go)"
         table.add_row(_dim("now"), Text(state.doing + countdown, style="bold"))
+        if work := under_way():
+            table.add_row(_dim("computing"), work_text(work, SystemClock().now()))
         table.add_row(_dim("next"), state.next_step())
-        table.add_row(_dim("frames"), f"{state.frames} of {state.plan.frames}{self._disk()}")
+        if due := state.next_by_hand():
+            table.add_row(_dim("by hand"), due.removeprefix("next by hand "))
+        table.add_row(_dim("frames"), f"{state.frames()}{self._disk()}")
         table.add_row(_dim("lab time left"), _countdown(state.left_s()))
         for patch, values in ({} if preview is None else preview.values).items():
             means = "  ".join(f"{channel} {mean:.1f}" for channel, mean in values.items())

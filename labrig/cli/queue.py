@@ -166,7 +166,7 @@ def _content(entry: "QueueEntry") -> dict[str, object]:
             }
             for state in entry.states
         ],
-        "warnings": list(entry.warnings),
+        "warnings": [each.to_dict() for each in entry.warnings],
     }
 
 

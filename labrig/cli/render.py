@@ -1,19 +1,14 @@
 """`labrig render`: measured materials in a scene, over time."""
 
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TextIO, cast
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labrig.cli.completion import complete_scene
-from labrig.cli.exit_codes import DetachableStream
+from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from labrig.reproduce import RenderFolder, Scene
 
 
@@ -106,6 +101,7 @@ def render(
 
     A rendering that was interrupted goes on when it is started again.
     """
+    from labrig.foundation.activity import activity
     from labrig.foundation.clock import SystemClock
     from labrig.foundation.quantity import duration_text
     from labrig.reproduce import (
@@ -124,72 +120,33 @@ def render(
     built = _changed(built, times, size, paths).displayed(white, exposure)
     adapted = None if built.white is None else white_under(built.white, built.bands.edges_nm)
     require_traceable(built)
-    for note in built.notes:
-        typer.echo(f"note: {note}", err=True)
+    for line in warning_lines(built.notes, "note: "):
+        typer.echo(line, err=True)
     folder = RenderFolder.open(out or Path("renders") / built.file.name, built)
     done, count = folder.n_done, len(folder.times_s)
     if done:
         typer.echo(f"{done} of {count} pictures are there already", err=True)
     clock = SystemClock()
     begin_s = clock.now()
-    with _bar() as bar:
-        frames = folder.rendered(built, report=bar.report)
+    with activity("rendering") as work:
+
+        def report(what: str, part: float) -> None:
+            if what != work.what:
+                work.restart(what, 100)
+            work.done = round(100 * part)
+
+        frames = folder.rendered(built, report=report)
         for number, frame in enumerate(frames, done + 1):
             left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
             remaining = f", about {duration_text(left_s)} left" if number < count else ""
-            bar.say(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}")
-            for warning in frame.warnings:
-                bar.say(f"warning: {warning}")
+            typer.echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
+            for line in warning_lines(frame.warnings, "warning: "):
+                typer.echo(line, err=True)
     _draw(folder, built, night, adapted, video, fps)
     if linear:
         _write_linear(folder)
     _export(folder, built, gltf, mitsuba)
     typer.echo(folder.path)
-
-
-class _Bar:
-    """What is done to a picture, and how long it still takes, in a line of the terminal."""
-
-    def __init__(self, progress: "Progress") -> None:
-        self._progress, self._what = progress, ""
-        self._task = progress.add_task("", total=1.0, visible=False)
-
-    def report(self, what: str, part: float) -> None:
-        """Show the part of something that is done."""
-        if what != self._what:
-            self._what = what
-            self._progress.reset(self._task, description=what, visible=True)
-        self._progress.update(self._task, completed=part)
-
-    def say(self, line: str) -> None:
-        """Print a line that stays."""
-        self._progress.console.print(line, markup=False, highlight=False, soft_wrap=True)
-
-
-@contextmanager
-def _bar() -> Iterator[_Bar]:
-    """Yield a bar on standard error, which is there on a terminal only and away at the end."""
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-    )
-    console = Console(file=cast(TextIO, DetachableStream(sys.stderr)))
-    with Progress(
-        *columns, console=console, transient=True, disable=not sys.stderr.isatty()
-    ) as progress:
-        yield _Bar(progress)
 
 
 def _export(
@@ -293,7 +250,7 @@ def _draw(
     frames = [folder.frame(number) for number in range(folder.n_done)]
     pictures, labels = [], []
     look = scene.file.display
-    notes = list(scene.notes)
+    notes = [str(note) for note in scene.notes]
     if adapted_white is not None and not night:
         notes.append(f"white is {look.white}, adapted to the screen by Bradford's transform")
     caption = "; ".join(notes)
@@ -305,7 +262,7 @@ def _draw(
         labels.append(f"{when}; white is {rounded(display.white_luminance, 2)} cd/m²")
         texts = {
             "Description": f"{scene.file.name} at {t_s:g} s",
-            "Comment": "; ".join([display.statement, *scene.notes]),
+            "Comment": "; ".join([display.statement, *map(str, scene.notes)]),
         }
         write_png(folder.path / f"{number:03d}.png", picture, texts)
         pictures.append(picture)

@@ -10,7 +10,7 @@ import typer
 
 from labrig.cli import default_rig, new_rig, page
 from labrig.cli.default_rig import RigArgument, rig_path
-from labrig.cli.exit_codes import DetachableStream
+from labrig.cli.detachable_stream import DetachableStream
 from labrig.foundation.errors import DeviceError, ProtocolError
 
 if TYPE_CHECKING:
@@ -38,9 +38,11 @@ def list_devices(
     from json import dumps
 
     from labrig.foundation import plugins
+    from labrig.foundation.activity import activity
     from labrig.setup import Host, discover
 
-    discovery = discover(Host.of_this_pc(), plugins.names(plugins.DRIVERS))
+    with activity("looking for devices"):
+        discovery = discover(Host.of_this_pc(), plugins.names(plugins.DRIVERS))
     if json:
         typer.echo(dumps(asdict(discovery)))
     else:
@@ -68,10 +70,11 @@ def check(
 
     from labrig.acquire import read_rig_file
     from labrig.bench import logging_to, open_bench
+    from labrig.foundation.activity import activity
     from labrig.setup import check_rig
 
     path = rig_path(rig)
-    with open_bench(read_rig_file(path), str(path)) as bench:
+    with activity("checking the rig"), open_bench(read_rig_file(path), str(path)) as bench:
         handler = logging.StreamHandler(DetachableStream(sys.stderr))
         with logging_to(handler, bench.clock) if verbose else nullcontext():
             report = check_rig(bench)

@@ -9,7 +9,7 @@ import typer
 
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.default_rig import RigOption, rig_path
-from labrig.cli.exit_codes import DetachableStream
+from labrig.cli.detachable_stream import DetachableStream
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.cli.protocol import protocol_path
 from labrig.foundation.clock import Interrupted
@@ -142,7 +142,7 @@ def resume(
     watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
     at_end = permitted(None if rig is None else rig.on_finish, path, is_asked_for=on_finish)
     with notify_at_end(at_end) as ending:
-        resume_run(folder, watch)
+        resume_run(folder, watch, partial(_confirmed, yes=yes))
         if is_processed:
             _print_processed(folder, json)
         else:
@@ -150,10 +150,20 @@ def resume(
         ending.message = str(folder)
 
 
+def _confirmed(question: str, *, yes: bool) -> bool:
+    """Ask the person at the terminal; nobody confirms anything where there is none."""
+    if yes:
+        print(f"warning: {question} yes", file=DetachableStream(sys.stderr))
+        return True
+    return sys.stdin.isatty() and typer.confirm(question, err=True)
+
+
 def _prepared(protocol: str, rig: Path, runs: Path) -> "Recording":
     from labrig.bench import Recording
+    from labrig.foundation.activity import activity
 
-    recording = Recording.prepare(protocol_path(protocol), rig, runs)
+    with activity("laying out the plan"):
+        recording = Recording.prepare(protocol_path(protocol), rig, runs)
     for note in recording.notes():
         # Nobody may read it: the run goes on.
         print(f"note: {note}", file=DetachableStream(sys.stderr))

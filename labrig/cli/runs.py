@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.wording import counted, measurement
 from labrig.foundation.errors import UsageError
+from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
@@ -110,19 +111,22 @@ def list_them(
 @app.command("show")
 def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     """All there is to know of one run, its notes and earlier results included."""
-    from labrig.catalogue import find_run, summarise
+    from labrig.catalogue import find_run, indexed_summary, unfinished
     from labrig.record import read_notes
 
     folder = find_run(run, runs)
-    summary, notes = summarise(folder), read_notes(folder)
+    summary, notes = indexed_summary(folder), read_notes(folder)
     if json:
-        _print_json({**_summary_json(summary), "notes": notes})
+        about = {"notes": notes, "unfinished": unfinished(summary)}
+        _print_json({**_summary_json(summary), **about})
         return
     typer.echo(f"{folder}")
     measured = measurement(summary.protocol, summary.sample)
     typer.echo(f"  {measured}, {_when(summary)} UTC, {summary.status}")
     units = "unit" if summary.units == 1 else "units"
     typer.echo(f"  {_progress(summary)} {units}, {counted(summary.frames, 'frame')}")
+    for line in unfinished(summary):
+        typer.echo(f"  {_printable(line)}")
     _print_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():
@@ -274,8 +278,8 @@ def _print_comparison(comparison: "Comparison") -> None:
 
     for key, value_a, value_b in comparison.protocol_differences:
         typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
-    for warning in comparison.warnings:
-        typer.echo(f"warning: {warning}")
+    for line in warning_lines(comparison.warnings, "warning: "):
+        typer.echo(line)
     if comparison.missing:
         typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
     if not comparison.patches:

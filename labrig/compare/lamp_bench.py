@@ -21,6 +21,7 @@ from labrig.compare.photographed_room import (
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.material import ReradiationMatrix
 from labrig.optics import CameraResponse
 from labrig.record import FrameRole, read_run
@@ -263,20 +264,21 @@ class LampBench:
 
 def _that_lose_light(
     result: PredictedUnderLamps, entry: BandsEntry
-) -> tuple[dict[str, ReradiationMatrix], tuple[str, ...]]:
-    """Return the matrices that a renderer takes, and a reason for each one that it does not.
+) -> tuple[dict[str, ReradiationMatrix], tuple[ResultWarning, ...]]:
+    """Return the matrices that a renderer takes, and a warning about each of the others.
 
     A radiance factor, which a bench measures for one direction, may be above 1; a scene's albedo
     may not.
     """
     bands = Bands.even(**entry.model_dump())
-    matrices, left_out = {}, []
+    matrices = {}
+    left_out: list[ResultWarning] = []
     for name, sample in result.samples.items():
         matrix = sample.matrix.named(name)
         try:
             of_matrix(matrix, bands)
         except (UsageError, DataError) as error:
-            left_out.append(f"left out: {error}")
+            left_out.append(Unmeasured("patch-failed", "left out: {reason}", reason=str(error)))
         else:
             matrices[name] = matrix
     if not matrices:

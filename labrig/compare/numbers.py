@@ -39,7 +39,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
             "description": comparison.description,
             "camera": comparison.camera.name if comparison.camera else None,
             "white": comparison.white,
-            "left_out": list(comparison.left_out),
+            "left_out": [each.to_dict() for each in comparison.left_out],
             "glow": {
                 glow.patch: {
                     "t_s": glow.t_s.tolist(),
@@ -116,9 +116,9 @@ def rendered_numbers(comparison: RenderedComparison) -> dict[str, Any]:
     plain: dict[str, Any] = _plain(
         {
             "description": " ".join(comparison.description),
-            "notes": list(comparison.notes),
-            "warnings": list(comparison.warnings),
-            "left_out": list(comparison.left_out),
+            "notes": [each.to_dict() for each in comparison.notes],
+            "warnings": [each.to_dict() for each in comparison.warnings],
+            "left_out": [each.to_dict() for each in comparison.left_out],
             "patches": {
                 patch.each.patch: {
                     "t_s": patch.each.t_s.tolist(),
@@ -174,7 +174,7 @@ def lamps_numbers(comparison: LampsComparison) -> dict[str, Any]:
     plain: dict[str, Any] = _plain(
         {
             "description": " ".join(comparison.description),
-            "notes": list(comparison.notes),
+            "notes": [each.to_dict() for each in comparison.notes],
             "channels": list(comparison.channels),
             "lamps": {
                 lamp.name: {

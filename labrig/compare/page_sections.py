@@ -127,7 +127,7 @@ def rendered_sections(comparison: RenderedComparison) -> tuple[Section, ...]:
 
 
 def _pictures(comparison: RenderedComparison) -> Iterator[Picture]:
-    patches, notes = comparison.patches, comparison.notes
+    patches, notes = comparison.patches, [str(note) for note in comparison.notes]
     below = "Numbers are CIEDE2000 to the photograph above; a dash: too dim to have a colour."
     yield Picture(
         "rendered",

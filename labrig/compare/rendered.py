@@ -27,6 +27,7 @@ from labrig.compare.viewing import DEFAULT_WHITE, Viewing, viewing
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.output_file import make_folder
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.material import Material
 from labrig.record import read_run
 from labrig.reproduce import Assumptions
@@ -204,22 +205,21 @@ class RenderedComparison:
     description
         How it was compared, in paragraphs for people.
     notes
-        What was assumed, one sentence each.
+        Warnings about values that were assumed.
     warnings
-        Why the measured material may not describe how the sample was charged, as its run says, one
-        sentence each.
+        Warnings of the run about the charging of the measured material.
     left_out
-        Renderings that are not possible, with the reason.
+        Warnings about renderings that are not possible, with the reason.
     scene
         The dark room with the measured materials; None if no patch could be compared.
     """
 
     patches: tuple[RenderedPatch, ...]
     description: tuple[str, ...]
-    notes: tuple[str, ...]
-    left_out: tuple[str, ...]
+    notes: tuple[ResultWarning, ...]
+    left_out: tuple[ResultWarning, ...]
     scene: DarkRoomScene | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
 
 
 def compare_rendered(
@@ -294,13 +294,16 @@ def compare_rendered(
         bench = RenderedBench(room, curves, Path(place), assumptions)
         measured = bench.measured({own[name]: patch for name, patch in patches.items()})
         conversion = viewing(curves, white)
-        compared, left_out, notes = [], [], list(measured.notes)
+        compared = []
+        left_out: list[ResultWarning] = []
         for name, patch in patches.items():
             try:
                 fits = fits_by_states(patch.series, patch.flicker, refit)
                 fitted = bench.fitted(patch, fits)
             except DataError as error:
-                left_out.append(f"{name} is left out: {error}")
+                left_out.append(
+                    Unmeasured("patch-failed", "left out: {reason}", name, reason=str(error))
+                )
                 continue
             left_out += fitted.left_out
             compared.append(
@@ -316,15 +319,15 @@ def compare_rendered(
     return RenderedComparison(
         tuple(compared),
         _description(conversion, [each.ratio.reflected_by for each in compared], room, left_out),
-        tuple(dict.fromkeys(notes)),
+        tuple(dict.fromkeys(measured.notes)),
         tuple(left_out),
         measured.scene if compared else None,
-        tuple(charging_doubts(result, [name for name in patches if name not in given])),
+        tuple(charging_warnings(result, [name for name in patches if name not in given])),
     )
 
 
-def charging_doubts(result: RunResult, patches: Sequence[str]) -> Iterator[str]:
-    """Yield what a run warns of how patches were charged, one sentence each.
+def charging_warnings(result: RunResult, patches: Sequence[str]) -> Iterator[ResultWarning]:
+    """Yield the warnings of a run about the charging of patches.
 
     Parameters
     ----------
@@ -338,7 +341,7 @@ def charging_doubts(result: RunResult, patches: Sequence[str]) -> Iterator[str]:
         for name, fit in part.provides().get("excitations", {}).items():
             if name in patches or (not name and patches):
                 of = f"{name}, excitation" if name else "excitation"
-                yield from (f"{of}: {warning}" for warning in fit.warnings)
+                yield from (warning.about(of) for warning in fit.warnings)
 
 
 def _completed(material: Material) -> Material:
@@ -376,7 +379,7 @@ def _description(
     conversion: Viewing,
     reflected_by: Sequence[str],
     room: PhotographedRoom,
-    left_out: Sequence[str],
+    left_out: Sequence[ResultWarning],
 ) -> tuple[str, ...]:
     by = " and ".join(dict.fromkeys(reflected_by))
     paragraphs = [
@@ -390,7 +393,7 @@ def _description(
         *_unread(room),
     ]
     if left_out:
-        paragraphs.append(f"Left out: {'; '.join(left_out)}.")
+        paragraphs.append(f"Left out: {'; '.join(map(str, left_out))}.")
     return tuple(paragraphs)
 
 

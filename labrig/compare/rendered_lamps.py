@@ -20,6 +20,7 @@ from labrig.compare.viewing import DEFAULT_WHITE, Viewing, viewing
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.plugins import measurement
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.foundation.yaml_file import read_yaml
 from labrig.optics import CIE_1931, delta_e, lab, observer, white_xyz
 from labrig.results import LampPatch, PredictedUnderLamps, read_result
@@ -112,7 +113,7 @@ class LampsComparison:
     description
         How it was compared, in paragraphs for people.
     notes
-        What is assumed or missing, one sentence each.
+        Warnings about values that are assumed or missing.
     scene
         The dark room with a picture under each lamp.
     """
@@ -120,7 +121,7 @@ class LampsComparison:
     channels: tuple[str, ...]
     lamps: tuple[RenderedLamp, ...]
     description: tuple[str, ...]
-    notes: tuple[str, ...]
+    notes: tuple[ResultWarning, ...]
     scene: DarkRoomScene
 
 
@@ -338,11 +339,15 @@ def _description(result: PredictedUnderLamps, conversion: Viewing) -> tuple[str,
     )
 
 
-def _notes(result: PredictedUnderLamps, *, is_same_camera: bool) -> Iterator[str]:
+def _notes(result: PredictedUnderLamps, *, is_same_camera: bool) -> Iterator[ResultWarning]:
     if result.without_matrix_sigma:
-        yield (
-            f"the matrices of {', '.join(result.without_matrix_sigma)} have no σ, which is missing "
-            "in that of the renderings"
+        yield Unmeasured(
+            "matrix-without-sigma",
+            "the matrices of {samples} have no σ, which is missing in that of the renderings",
+            samples=result.without_matrix_sigma,
         )
     if not is_same_camera:
-        yield "σ is that of the camera's curves with which the run was processed"
+        yield Unmeasured(
+            "sigma-of-other-curves",
+            "σ is that of the camera's curves with which the run was processed",
+        )

@@ -19,6 +19,7 @@ from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import Misfit, ResultWarning, Undetermined
 from labrig.material import DECAY_LAWS, MAX_ORDER, Material, State, write_material
 from labrig.optics import CameraResponse
 from labrig.reproduce import (
@@ -64,7 +65,7 @@ class SeenPatch:
 @dataclass(frozen=True, eq=False)
 class SeenRoom:
     patches: Mapping[str, SeenPatch]
-    notes: tuple[str, ...]
+    notes: tuple[ResultWarning, ...]
     scene: DarkRoomScene
 
 
@@ -74,7 +75,7 @@ class FittedGlow:
 
     glow: Mapping[str, FloatArray]
     relative_sigma: Mapping[str, FloatArray]
-    left_out: tuple[str, ...]
+    left_out: tuple[ResultWarning, ...]
 
 
 class RenderedBench:
@@ -127,11 +128,20 @@ class RenderedBench:
 
         Laws without states have the colour of the rendered ones, and their own course over time.
         """
-        series, left_out = patch.series, []
+        series = patch.series
+        left_out: list[ResultWarning] = []
         each: dict[str, tuple[tuple[State, ...], tuple[FloatArray, FloatArray]]] = {}
         for number, fit in fits.items():
             if fit.n_states != number:
-                left_out.append(f"{patch.name}: the decay does not support {number} states")
+                left_out.append(
+                    Undetermined(
+                        "states-unsupported",
+                        "the decay does not support {requested} states",
+                        patch.name,
+                        requested=number,
+                        supported=fit.n_states,
+                    )
+                )
                 continue
             states = tuple(
                 _full_state(patch.material, state.amplitude, state.k_r_per_s)
@@ -149,8 +159,12 @@ class RenderedBench:
             each[BECQUEREL] = ((state,), signal)
         else:
             left_out.append(
-                f"{patch.name}: Becquerel's law fits with no kinetic order from above 1 to "
-                f"{MAX_ORDER:g}"
+                Misfit(
+                    "no-kinetic-order",
+                    "Becquerel's law fits with no kinetic order from above 1 to {most:g}",
+                    patch.name,
+                    most=MAX_ORDER,
+                )
             )
         # All at once, side by side: nothing else lights them.
         regions = {

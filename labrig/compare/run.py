@@ -25,6 +25,7 @@ from labrig.compare.viewing import DEFAULT_WHITE, viewing
 from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.foundation.yaml_file import did_you_mean, read_yaml
 from labrig.material import Material, MaterialComparison, compare_materials, read_material
 from labrig.optics import CameraResponse
@@ -151,7 +152,7 @@ class RunComparison:
         Emission spectra in three channels, each with its resolution: those of the patches where
         known, of the reference materials and of Table 1.
     left_out
-        Comparisons that are not possible, with the reason.
+        Warnings about comparisons that are not possible, with the reason.
     """
 
     camera: CameraResponse | None
@@ -161,7 +162,7 @@ class RunComparison:
     residuals: tuple[Residuals, ...]
     material_comparisons: tuple[MaterialComparison, ...]
     spectra: tuple[tuple[ThreeChannels, str], ...]
-    left_out: tuple[str, ...]
+    left_out: tuple[ResultWarning, ...]
 
 
 def compare_run(
@@ -239,7 +240,9 @@ def compare_run(
             predictions = _predictions(patch, fits, references.get(patch.name), curves)
             glows.append(compare_glow(patch.series, predictions, conversion, patch.flicker))
         except DataError as error:
-            left_out.append(f"{patch.name} is left out: {error}")
+            left_out.append(
+                Unmeasured("patch-failed", "left out: {reason}", patch.name, reason=str(error))
+            )
     return RunComparison(
         camera=curves,
         white=white,
@@ -282,8 +285,8 @@ def references_by_patch(materials: Sequence[str], patches: Sequence[str]) -> dic
 
 def measured_camera(
     folder: Path, replacement: str | None
-) -> tuple[CameraResponse | None, list[str]]:
-    """Return the curves requested, else those of the processing, and why there are none."""
+) -> tuple[CameraResponse | None, list[ResultWarning]]:
+    """Return the curves requested, else those of the processing; without any, a warning."""
     rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), read_run(folder).camera_identity)
     try:
         lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
@@ -291,7 +294,13 @@ def measured_camera(
     except UsageError as error:
         if replacement is not None:
             raise
-        return None, [f"no camera curves: {error}; give them with --camera"]
+        return None, [
+            Unmeasured(
+                "camera-curves-missing",
+                "no camera curves: {reason}; give them with --camera",
+                reason=str(error),
+            )
+        ]
 
 
 def _predictions(

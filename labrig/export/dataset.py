@@ -131,7 +131,7 @@ def _nodes(result: RunResult) -> "dict[str, Dataset]":
             place = "/" + "/".join(inner)
             variables.setdefault(place, {}).update(_columns(".".join((*inner, name)), name, value))
     nodes = {place: xarray.Dataset(columns) for place, columns in variables.items()}
-    nodes["/"].attrs["warnings"] = "\n".join(result.warnings)
+    nodes["/"].attrs["warnings"] = "\n".join(map(str, result.warnings))
     if isinstance(result, ChainResult):
         for name, part in result.parts.items():
             nodes |= {f"/{name}{path}".rstrip("/"): node for path, node in _nodes(part).items()}
@@ -234,5 +234,8 @@ def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict
         "offset_sigma": (weights, channel_rows("offsets_sigma"), DN_PER_S),
         "flicker": ("patch", patch_values("flicker")),
         "reduced_chi2": ("patch", patch_values("reduced_chi2")),
-        "fit_warnings": ("patch", ["\n".join(fit.warnings) if fit else "" for fit in fits]),
+        "fit_warnings": (
+            "patch",
+            ["\n".join(map(str, fit.warnings)) if fit else "" for fit in fits],
+        ),
     }

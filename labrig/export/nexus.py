@@ -363,7 +363,7 @@ def _add_entry(file: h5py.File, run: RunRecord, about: RunDescription, result: R
     versions = [f"{name} {version}" for name, version in about.libraries]
     add_note(entry, "libraries", "\n".join(versions), "text/plain")
     if result.warnings:
-        add_note(entry, "warnings", "\n".join(result.warnings), "text/plain")
+        add_note(entry, "warnings", "\n".join(map(str, result.warnings)), "text/plain")
 
     sample = add_group(entry, "sample", "NXsample")
     add_text(sample, "name", about.title)

@@ -18,6 +18,7 @@ from labrig.fit.nonlinear_least_squares import least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.quantity import duration_text
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Undetermined
 from labrig.results import (
     MARKING_S,
     NORMAL_95,
@@ -270,7 +271,7 @@ class _Readings:
         scatter: FloatArray = relative * np.abs(self.value)
         return scatter
 
-    def slow_end(self) -> tuple[str, ...]:
+    def slow_end(self) -> tuple[ResultWarning, ...]:
         """Return a warning if a dim end falls more slowly than what is before it."""
         last_s = float(self.t_s[-1])
         end = self.parabola(last_s, at_end=True)
@@ -282,19 +283,28 @@ class _Readings:
         if math.log(end.luminance / going_on) < SLOWER_SIGMAS * sigma:
             return ()
         return (
-            f"after {duration_text(last_s / EARLIER)} the luminance falls more slowly than before: "
-            "a constant light, or an error of the meter's zero, of "
-            f"{end.luminance - going_on:.2g} {UNIT} would do that; read the meter with the sample "
-            "covered",
+            Disturbance(
+                "constant-light",
+                "after {after} the luminance falls more slowly than before: a constant light, or "
+                "an error of the meter's zero, of {light_mcd_per_m2:.2g} mcd/m² would do that; "
+                "read the meter with the sample covered",
+                after=duration_text(last_s / EARLIER),
+                after_s=last_s / EARLIER,
+                light_mcd_per_m2=end.luminance - going_on,
+            ),
         )
 
-    def forecast(self, limit: float) -> tuple[ForecastTime | None, tuple[str, ...]]:
+    def forecast(self, limit: float) -> tuple[ForecastTime | None, tuple[ResultWarning, ...]]:
         """Return when the luminance falls below a limit after the last reading, or why not."""
         end = self.parabola(float(self.t_s[-1]), at_end=True)
         if end is not None and end.luminance * (1 + NORMAL_95 * end.relative_sigma) < limit:
             return None, (
-                f"the last readings are below {limit:g} {UNIT}, and no reading before is clearly "
-                "above it: begin earlier after lamp off",
+                Undetermined(
+                    "limit-before-record",
+                    "the last readings are below {limit_mcd_per_m2:g} mcd/m², and no reading "
+                    "before is clearly above it: begin earlier after lamp off",
+                    limit_mcd_per_m2=limit,
+                ),
             )
         constant = float(self.scale_sigma.min())
         added = math.sqrt(float(self.scale_sigma[-1]) ** 2 - constant**2)
@@ -308,4 +318,11 @@ class _Readings:
                 (),
             )
         except FitError as error:
-            return None, (f"no forecast of when {limit:g} {UNIT} is reached: {error}",)
+            return None, (
+                Undetermined(
+                    "no-forecast",
+                    "there is no forecast of when {limit_mcd_per_m2:g} mcd/m² is reached: {reason}",
+                    limit_mcd_per_m2=limit,
+                    reason=str(error),
+                ),
+            )

@@ -8,6 +8,7 @@ from scipy.special import chdtrc
 
 from labrig.foundation.errors import FitError
 from labrig.foundation.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
+from labrig.foundation.result_warning import Contradiction, Misfit, ResultWarning
 from labrig.results import Measured, TrapDepth
 
 #: Span of the temperatures that tells a depth, in K.
@@ -123,25 +124,40 @@ def fit_trap_depth(
 
 def _warnings(
     depth_ev: float, sigma_ev: float, log10_frequency: Measured, p_value: float
-) -> list[str]:
-    """Return what speaks against one depth, or against thermal release."""
+) -> list[ResultWarning]:
+    """Return warnings that contradict one depth, or thermal release."""
     if depth_ev < 2 * sigma_ev:
         return [
-            f"the rates do not rise with temperature (E = {Measured(depth_ev, sigma_ev, 'eV')}): "
-            "traps are not emptied by heat, or the thermometer is not at the sample"
+            Misfit(
+                "rates-not-thermal",
+                "the rates do not rise with temperature (E = {depth}): traps are not emptied by "
+                "heat, or the thermometer is not at the sample",
+                depth=Measured(depth_ev, sigma_ev, "eV"),
+            )
         ]
-    warnings = []
+    warnings: list[ResultWarning] = []
     if p_value < MISSED:
         warnings.append(
-            f"one depth does not describe these rates (p = {p_value:.1g}): several traps, or a "
-            "temperature that is not the sample's; measure at more temperatures"
+            Misfit(
+                "depth-misfit",
+                "a single depth does not describe these rates (p = {p_value:.1g}): there are "
+                "several traps, or the temperature is not that of the sample; measure at more "
+                "temperatures",
+                p_value=p_value,
+            )
         )
     low, high = (math.log10(each) for each in FREQUENCIES)
     beyond = max(low - log10_frequency.value, log10_frequency.value - high)
     if beyond > 2 * log10_frequency.sigma:
         warnings.append(
-            f"the frequency factor 10^{log10_frequency} 1/s is none of a lattice (10^{low:.0f} to "
-            f"10^{high:.0f} 1/s): the temperature may not be the sample's, or several traps look "
-            "like one"
+            Contradiction(
+                "frequency-unphysical",
+                "the frequency factor 10^{log10_frequency} 1/s is none of a lattice "
+                "(10^{log10_low:.0f} to 10^{log10_high:.0f} 1/s): the temperature may not be that "
+                "of the sample, or several traps look like a single trap",
+                log10_frequency=log10_frequency,
+                log10_low=low,
+                log10_high=high,
+            )
         )
     return warnings

@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
@@ -124,6 +125,7 @@ def _absolute(value: Any, types: list[Any], folder: Path) -> Any:
     return value
 
 
+@cache
 def _keys(model: type[BaseModel]) -> dict[str, list[Any]]:
     """Return the types that the value of each key of a model may have, and marks of paths."""
     return {

@@ -8,6 +8,8 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 MIN_PLAIN = 1e-3
 #: Values from here on are written with a power of ten.
 MAX_PLAIN = 1e6
+#: Value in its σ below which rounding to the digits of σ would leave 0: it keeps its own digits.
+VANISHES_SIGMAS = 0.005
 
 #: Exposure times below this are written as fractions.
 MAX_FRACTION_S = 0.3
@@ -24,6 +26,8 @@ def plus_minus(value: float, sigma: float) -> str:
         return f"{rounded(value)} (held)"
     if not math.isfinite(sigma):
         return f"{rounded(value, 3)} ± ?"
+    if 0 < abs(value) < VANISHES_SIGMAS * sigma:
+        return f"{rounded(value, 2)} ± {rounded(sigma, 2)}"
     exponent = _exponent(max(abs(value), sigma))
     plain = MIN_PLAIN <= 10.0**exponent < MAX_PLAIN
     scale = 1.0 if plain else 10.0**exponent
@@ -69,6 +73,14 @@ def exposure_text(exposure_s: float) -> str:
 def power_of_ten(exponent: int) -> str:
     """Format a power of ten, such as `10⁻³`."""
     return "10" + str(exponent).translate(_SUPERSCRIPT)
+
+
+def as_written(number: str) -> str:
+    """Return a formatted number as people write it: `−1.2`, `12 %`, `3 × 10⁻⁷`."""
+    mantissa, e, exponent = number.replace("-", "−").replace("%", " %").partition("e")
+    if not e:
+        return mantissa
+    return f"{mantissa} × {power_of_ten(int(exponent.replace('−', '-')))}"
 
 
 def _exponent(number: float) -> int:

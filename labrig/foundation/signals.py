@@ -103,11 +103,37 @@ def name_of(signum: int) -> str:
         return f"signal {signum}"
 
 
+#: Signal that `raise_interrupted` has handled; none at first.
+_handled: list[int] = []
+
+
 def raise_interrupted(signum: int, frame: FrameType | None) -> None:
     """Handle a signal while nothing is connected by raising `Interrupted`; ignore further ones."""
     for ignored in STOP_SIGNALS:
         signal.signal(ignored, signal.SIG_IGN)
+    _handled[:] = [signum]
     raise Interrupted(signum)
+
+
+def await_signals() -> None:
+    """Let the next signal that stops labrig raise `Interrupted`, while nothing is connected."""
+    _handled.clear()
+    for signum in STOP_SIGNALS:
+        signal.signal(signum, raise_interrupted)
+
+
+def raise_again() -> None:
+    """Raise `Interrupted` once more if a signal was handled and its exception got lost.
+
+    Python drops an exception that is raised while it deletes an object.
+
+    Raises
+    ------
+    Interrupted
+        A signal was handled before.
+    """
+    if _handled:
+        raise Interrupted(_handled[0])
 
 
 def end_at_once(signum: int, frame: FrameType | None) -> NoReturn:

@@ -17,6 +17,7 @@ from labrig.acquire import CameraCapabilities, ProtocolModel
 from labrig.fit import EPSILON
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import ProtocolError, UsageError
+from labrig.foundation.result_warning import Contradiction, Extrapolated, ResultWarning
 from labrig.predict.frames import CameraFigures, dark_frames, glow_frames
 from labrig.predict.glow import Glow
 from labrig.predict.series import DARK, FLICKER, ExpectedSeries, expected_series, repeated
@@ -215,7 +216,7 @@ class Expectation:
     found: Mapping[str, Information]
     clipped: Mapping[str, int]
     states_chosen: bool
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
 
 def expect(protocol: DecaySettings, capabilities: CameraCapabilities, bench: Bench) -> Expectation:
@@ -227,15 +228,25 @@ def expect(protocol: DecaySettings, capabilities: CameraCapabilities, bench: Ben
         If too few frames of a patch remain that do not clip.
     """
     bench = bench.at_settings(protocol.camera)
-    warnings: list[str] = []
-    schedule = expected_schedule(protocol, capabilities, bench, warnings.append)
+    warnings: list[ResultWarning] = []
+
+    def warn(text: str) -> None:
+        warnings.append(Extrapolated("metering-at-limit", "{reason}", reason=text))
+
+    schedule = expected_schedule(protocol, capabilities, bench, warn)
     series, clipped = {}, {}
     for patch, glow in bench.glows.items():
         series[patch], clipped[patch] = _series(protocol, capabilities, bench, patch, schedule)
         if protocol.states not in ("auto", len(glow.rate_per_s)):
             warnings.append(
-                f"{patch}: the protocol asks for {protocol.states} states, the material has "
-                f"{len(glow.rate_per_s)}; predicted is a fit of {len(glow.rate_per_s)}"
+                Contradiction(
+                    "states-differ",
+                    "the protocol asks for {requested} states, the material has {states}; "
+                    "predicted is a fit of {states}",
+                    patch,
+                    requested=protocol.states,
+                    states=len(glow.rate_per_s),
+                )
             )
     return Expectation(
         exposures_s=tuple(schedule.exposures_s),

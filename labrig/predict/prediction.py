@@ -9,6 +9,7 @@ from pydantic import ValidationError
 
 from labrig.acquire import Plan, ProtocolModel, RigFile, plan
 from labrig.foundation.errors import UsageError
+from labrig.foundation.result_warning import ResultWarning
 from labrig.predict.assumptions import Sources, collect_assumptions
 from labrig.predict.expectation import Bench, expect, predictable
 from labrig.predict.patch import PatchPrediction, predicted_patches
@@ -158,7 +159,7 @@ class Prediction:
     remedies: tuple[Remedy, ...]
     brightness_known: frozenset[str]
     notes: tuple[str, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
     def to_json(self) -> str:
         """Return the prediction as JSON; infinite values are null."""
@@ -184,7 +185,7 @@ class Prediction:
                 for remedy in self.remedies
             ],
             "notes": self.notes,
-            "warnings": self.warnings,
+            "warnings": [each.to_dict() for each in self.warnings],
         }
         return json.dumps(content, ensure_ascii=False)
 

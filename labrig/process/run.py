@@ -1,7 +1,6 @@
 """Processing of a run of any protocol, from its folder to result, report and exports."""
 
 import shutil
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,6 +22,11 @@ from labrig.export import write_nexus
 from labrig.foundation.errors import DiskError, FitError, UsageError
 from labrig.foundation.output_file import make_folder_in
 from labrig.foundation.plugins import measurement
+from labrig.foundation.result_warning import (
+    ResultWarning,
+    Unmeasured,
+    warning_lines,
+)
 from labrig.foundation.yaml_file import write_yaml
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
@@ -30,10 +34,10 @@ from labrig.process.provenance import PROVENANCE, Provenance, describe_run, prov
 from labrig.process.result_changes import changes
 from labrig.process.verification import require_as_sealed
 from labrig.record import (
-    CLOCK_STEPPED,
     PC_CLOCK,
     RunLock,
     RunRecord,
+    clock_stepped,
     read_run,
     require_plain_folder,
 )
@@ -236,9 +240,9 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     write_result(result_folder, result)
     write_nexus(result_folder / "run.nxs", run, about, result)
     rendered = _render(result, Source(run, protocol, rig, about, camera))
-    lines = tuple(_without_warnings(text, warnings) for text in rendered.lines)
-    write_summary(result_folder, [*lines, *(f"warning: {warning}" for warning in warnings)])
-    report = Report(about, warnings, rendered.sections, rendered.methods, frames, camera)
+    warning_texts = warning_lines(result.warnings, "warning: ")
+    write_summary(result_folder, [*rendered.lines, *warning_texts])
+    report = Report(about, result.warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
     include_comparison(folder, result_folder)
     changes = put_in_place(result_folder)
@@ -247,7 +251,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     page = folder / "result" / "report.html"
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
-    return Processed(result, page, lines, changes)
+    return Processed(result, page, rendered.lines, changes)
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:
@@ -310,39 +314,37 @@ def _render(result: RunResult, source: Source) -> Rendered:
     return replace(rendered, sections=(*rendered.sections, *more))
 
 
-def _unfinished_warnings(run: RunRecord, protocol: ProtocolModel) -> tuple[str, ...]:
+def _unfinished_warnings(run: RunRecord, protocol: ProtocolModel) -> tuple[ResultWarning, ...]:
     """Return a warning of the units that an unfinished run lacks."""
     units, completed = [unit.name for unit in protocol.units()], run.completed()
     if not (missing := [name for name in units if name not in completed]):
         return ()
     return (
-        f"the run is not finished: {len(missing)} of {len(units)} units are missing, from "
-        f"{missing[0]} on; go on with: labrig resume {run.name}",
+        Unmeasured(
+            "run-unfinished",
+            "the run is not finished: {missing} of {units} units are missing, from {first} on; go "
+            "on with: labrig resume {run}",
+            missing=len(missing),
+            units=len(units),
+            first=missing[0],
+            run=run.name,
+        ),
     )
 
 
-def _clock_step_warnings(run: RunRecord) -> tuple[str, ...]:
+def _clock_step_warnings(run: RunRecord) -> tuple[ResultWarning, ...]:
     """Return a warning of each step of the PC's clock during the completed units of a run."""
     return tuple(
-        CLOCK_STEPPED.format(f"{action.action} in {attempt.unit}")
+        clock_stepped(f"{action.action} in {attempt.unit}")
         for attempt in run.completed().values()
         for action in attempt.actions
         if action.device == PC_CLOCK
     )
 
 
-def _without_warnings(text: str, warnings: Sequence[str]) -> str:
-    """Return lines of a result without those that repeat a warning."""
-    return "\n".join(
-        line
-        for line in text.splitlines()
-        if not (line.startswith("! ") and any(each.endswith(line[2:]) for each in warnings))
-    )
-
-
 def _camera_response(
     rig: RigFile, replacement: str | None, lvf: LvfFile | None
-) -> tuple[CameraResponse | None, tuple[str, ...]]:
+) -> tuple[CameraResponse | None, tuple[ResultWarning, ...]]:
     """Return the curves that colour the report's pictures, or a warning if they are missing."""
     try:
         camera = camera_curves(rig, replacement, lvf)
@@ -350,10 +352,19 @@ def _camera_response(
         if replacement is not None:
             raise
         is_named = rig.optics.camera is not None
-        return None, (f"colours in the report are the camera's own: {error}",) if is_named else ()
+        own = Unmeasured(
+            "camera-curves-missing",
+            "colours in the report are the camera's own: {reason}",
+            reason=str(error),
+        )
+        return None, (own,) if is_named else ()
     if camera.has_ratios:
         return camera, ()
     return camera, (
-        f"the curves of {camera.name} have every channel scaled to 1: colours, and all that "
-        "compares channels, are off; name curves with the channels' ratios under 'optics:'",
+        Unmeasured(
+            "camera-curves-scaled",
+            "the curves of {camera} have every channel scaled to 1: colours, and all that "
+            "compares channels, are off; name curves with the channels' ratios under 'optics:'",
+            camera=camera.name,
+        ),
     )

@@ -247,7 +247,7 @@ def _check_content(
     ]
     differences = list(_differences(run))
     changed += differences
-    doubtful += clock_warnings(run)
+    doubtful += map(str, clock_warnings(run))
     if not differences and not doubtful:
         intact.append("settings and times of the frames are those in their files")
     path = folder / "result" / PROVENANCE

@@ -210,9 +210,9 @@ def report_table(
         },
         states_requested=options.states,
         warnings=tuple(
-            f"{part.region}: {text}" if len(fitted) > 1 else text
+            warning.about(part.region if len(fitted) > 1 else "")
             for part in fitted
-            for text in part.fit.warnings
+            for warning in part.fit.warnings
         ),
     )
     provenance = TableProvenance(

@@ -10,6 +10,7 @@ from filelock import Timeout
 from labrig.acquire import SAMPLE_CHANGER, RigFile, driver_and_settings, read_rig_file
 from labrig.bench import Recording, Watch, resume_run
 from labrig.catalogue import summarise
+from labrig.foundation.activity import activity
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.file_lock import plain_lock
 from labrig.process import process_and_report
@@ -91,7 +92,9 @@ def run_queue(path: Path, runs: Path, attendant: Attendant) -> Path:
             before = done[-1].summary.sample if done and done[-1].summary else ""
             attendant.tell(f"{due[0].number} of {len(listed)}: {_words(due[0].queued)}")
             try:
-                process_and_report(_recorded(path, runs, due[0], before, attendant))
+                recorded = _recorded(path, runs, due[0], before, attendant)
+                with activity(f"processing {recorded.name}"):
+                    process_and_report(recorded)
             except DataError as error:
                 failed.append(due[0].number)
                 attendant.tell(f"{due[0].number}: {error}")

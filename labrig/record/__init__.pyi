@@ -9,7 +9,6 @@ from .checksums import (
     own_digest as own_digest,
 )
 from .frames import (
-    CLOCK_STEPPED as CLOCK_STEPPED,
     PC_CLOCK as PC_CLOCK,
     PERSON as PERSON,
     UNDONE as UNDONE,
@@ -19,6 +18,7 @@ from .frames import (
     FrameRole as FrameRole,
     SpectrumRecord as SpectrumRecord,
     TemperatureRecord as TemperatureRecord,
+    clock_stepped as clock_stepped,
     unit_in as unit_in,
     unit_within as unit_within,
 )

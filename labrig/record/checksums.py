@@ -22,6 +22,7 @@ from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import TypeVar
 
+from labrig.foundation.activity import counted
 from labrig.foundation.errors import DiskError, LabrigError
 from labrig.foundation.input_file import MAX_JSON_BYTES, open_regular, read_text
 from labrig.foundation.output_file import make_folder_in, write_durably, write_private
@@ -122,7 +123,9 @@ def damaged_frames(
     checked = _read_checked(run) if trust else {}
     unchecked = [frame for frame in frames if not _is_checked(frame, checked)]
     with ThreadPoolExecutor(_READERS) as pool:
-        states = list(pool.map(_checked_state, unchecked))
+        states = list(
+            counted(pool.map(_checked_state, unchecked), "reading frames", len(unchecked))
+        )
     damaged = {}
     for frame, state in zip(unchecked, states, strict=True):
         if isinstance(state, str):

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from labrig.foundation.result_warning import Disturbance
+
 
 class FrameRole(StrEnum):
     """Role of a frame in any protocol; a protocol may have further roles.
@@ -110,10 +112,16 @@ FileRecord = FrameRecord | SpectrumRecord
 PERSON, UNDONE = "person", "taken back"
 #: Device of a step of the PC's time of day, and the warning of one.
 PC_CLOCK = "clock of the PC"
-CLOCK_STEPPED = (
-    "the clock of this PC was {}: times of day in this run go on by the clock as it was before, "
-    "durations are right"
-)
+
+
+def clock_stepped(change: str) -> Disturbance:
+    """Return the warning of a step of the PC's time of day, such as `set ahead by 1 h`."""
+    return Disturbance(
+        "pc-clock-stepped",
+        "the clock of this PC was {change}: times of day in this run go on by the clock as it was "
+        "before, durations are right",
+        change=change,
+    )
 
 
 def unit_in(part: str, unit: str) -> str:
@@ -133,7 +141,7 @@ def unit_in(part: str, unit: str) -> str:
 
     Examples
     --------
-    >>> from labrig.record import unit_in
+    from labrig.record import unit_in
     >>> unit_in("decay", "decay-1")
     'decay/decay-1'
     """

@@ -260,12 +260,27 @@ class RunFolder:
         """Return the record of everything acknowledged so far, without access to the disk."""
         return run_record(self.path, self._journal.read())
 
+    @property
+    def was_torn(self) -> bool:
+        """Whether the last line of the journal was incomplete as the folder was opened."""
+        return self._journal.was_torn
+
     def unknown_files(self) -> list[str]:
         """Return the names of files among the frames that have no journal line, left by a crash."""
         recorded = {file.path.name for attempt in self.read().attempts for file in attempt.files}
         return sorted(
             path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
         )
+
+    def lost_files(self) -> list[str]:
+        """Return the names of files after the last in the journal, whose lines were lost.
+
+        A crash leaves one at most, which it kept from its line; several had lines.
+        """
+        recorded = [file.path.name for attempt in self.read().attempts for file in attempt.files]
+        last = max(recorded, default="")
+        later = [name for name in self.unknown_files() if name > last and not name.endswith(PART)]
+        return later if len(later) > 1 else []
 
     def attempt(
         self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]

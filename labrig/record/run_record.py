@@ -61,6 +61,8 @@ class Attempt:
         Reason of the RunStop.
     frames, actions, temperatures, spectra
         Records of the attempt.
+    stop_time
+        Time of the RunStop in seconds since 1970; None where there is none.
     """
 
     uid: str
@@ -72,6 +74,7 @@ class Attempt:
     actions: list[ActionRecord] = field(default_factory=list)
     temperatures: list[TemperatureRecord] = field(default_factory=list)
     spectra: list[SpectrumRecord] = field(default_factory=list)
+    stop_time: float | None = None
 
     @property
     def files(self) -> list[FileRecord]:
@@ -120,6 +123,10 @@ class RunRecord:
             if identity := dict(attempt.start.get("devices", {})).get("camera"):
                 return str(identity)
         return ""
+
+    def began_with(self, key: str) -> str:
+        """Return a text of the first RunStart, such as `protocol`; empty if there is none."""
+        return str(self.attempts[0].start.get(key, "")) if self.attempts else ""
 
     def completed(self) -> dict[str, Attempt]:
         """Return the completed attempt of each unit by the unit's name, in order of completion.
@@ -325,7 +332,12 @@ def _close_attempt(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
         "temperatures": len(attempt.temperatures),
     }
     check_stop(doc, counts)
-    return replace(attempt, exit_status=doc["exit_status"], reason=doc.get("reason", ""))
+    return replace(
+        attempt,
+        exit_status=doc["exit_status"],
+        reason=doc.get("reason", ""),
+        stop_time=float(doc["time"]),
+    )
 
 
 def _check_times(record: Recorded) -> Recorded:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, get_type_hints
 
+from labrig.foundation.activity import counted
 from labrig.record import FRAMES
 from labrig.reduce.frame_workers import Reduction, reduced_text, texts_from_workers, worker_count
 from labrig.reduce.kept_reductions import ReductionCache, decoded
@@ -112,7 +113,8 @@ def reduce_groups(
     missing = [number for number in range(len(groups)) if number not in outcomes]
     try:
         texts = _texts([groups[number] for number in missing], reduction)
-        for number, text in zip(missing, texts, strict=True):
+        numbered = zip(missing, texts, strict=True)
+        for number, text in counted(numbered, "reducing frames", len(missing)):
             outcomes[number] = decoded(text, kind)
             if (folder := _folder(groups[number])) is not None:
                 kept[folder].add(_key(groups[number]), text)

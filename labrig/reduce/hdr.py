@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,6 +45,8 @@ class HdrFrame:
 
         Pixels that are NaN count as bright.
         """
+        import cv2  # plans and lists of runs need no OpenCV
+
         filled = np.where(np.isnan(self.rate), np.nanmax(self.rate), self.rate)
         size = (max(self.cfa_side, 2),) * 2
         smoothed = cv2.blur(filled.astype(np.float32), size, borderType=cv2.BORDER_REFLECT)

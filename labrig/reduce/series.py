@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.optics import CameraModel
 from labrig.reduce.dark import DarkModel, fit_dark
 from labrig.reduce.glare import FRAME_TILES, frame_series, subtract_glare
@@ -487,8 +488,10 @@ def _patch_series(
     )
 
 
-def _cut_off_warning(patch: _PatchLevels, added: Floats, sigma: Floats) -> tuple[str, ...]:
-    """Return one line on the correction for noise cut off below black; empty without one.
+def _cut_off_warning(
+    patch: _PatchLevels, added: Floats, sigma: Floats
+) -> tuple[ResultWarning, ...]:
+    """Return a warning about the correction for noise cut off below black; empty without one.
 
     `added` is what it adds to the values, in their unit as `sigma`, shape (n, C).
     """
@@ -497,19 +500,38 @@ def _cut_off_warning(patch: _PatchLevels, added: Floats, sigma: Floats) -> tuple
         return ()
     if patch.untold.any():
         return (
-            f"the camera subtracts black and cuts off noise below it; {patch.untold.sum()} of "
-            f"{len(usable)} frames are near black and too uneven to tell this noise, so that their "
-            "values are too large by up to 0.4 of it: leave these frames out, photograph an even "
-            "surface, or let the camera keep its black level (offset, brightness)",
+            Disturbance(
+                "black-cut-off",
+                "the camera subtracts black and cuts off noise below it; {uncorrected} of {frames} "
+                "frames are near black and too uneven to determine this noise, so that their "
+                "values are too large by up to 0.4 of it: leave these frames out, photograph an "
+                "even surface, or let the camera keep its black level (offset, brightness)",
+                uncorrected=int(patch.untold.sum()),
+                frames=len(usable),
+            ),
         )
     sigmas = (np.abs(added) / sigma)[usable].max(axis=1)
-    begin = "the camera subtracts black and cuts off noise below it, for which values are corrected"
     if sigmas.max() <= 1:
-        return (f"{begin} by less than their σ",)
+        return (
+            Disturbance(
+                "black-cut-off",
+                "the camera subtracts black and cuts off noise below it, for which values are "
+                "corrected by less than their σ",
+                most_sigmas=sigmas.max(),
+            ),
+        )
     return (
-        f"{begin} by up to {np.abs(added[usable]).max():.2g} DN/s, in "
-        f"{np.count_nonzero(sigmas > 1)} of {len(sigmas)} frames by more than their σ: what is "
-        "faint rests on it; if the camera can keep its black level (offset, brightness), let it",
+        Disturbance(
+            "black-cut-off",
+            "the camera subtracts black and cuts off noise below it, for which values are "
+            "corrected by up to {most_dn_per_s:.2g} DN/s, in {beyond_sigma} of {frames} frames by "
+            "more than their σ: faint values rest on it; if the camera can keep its black level "
+            "(offset, brightness), let it",
+            most_dn_per_s=np.abs(added[usable]).max(),
+            beyond_sigma=int(np.count_nonzero(sigmas > 1)),
+            frames=len(sigmas),
+            most_sigmas=sigmas.max(),
+        ),
     )
 
 

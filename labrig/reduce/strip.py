@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -201,6 +200,8 @@ def strip_profile(frame: HdrFrame, strip: Strip) -> StripProfile:
 
 def _largest_lit_patch(light: Image) -> NDArray[np.uint8] | None:
     """Mark the largest lit patch by 1, shape (height, width); None without light."""
+    import cv2  # plans and lists of runs need no OpenCV
+
     ground = float(np.median(light))
     noise = 1.4826 * float(np.median(np.abs(light - ground)))
     above = light - np.float32(ground)
@@ -225,6 +226,8 @@ def _rectangle(lit_mask: NDArray[np.uint8]) -> tuple[tuple[float, float], float,
 
     Moments involve all pixels: they resolve a tilt of a fraction of a pixel, which corners do not.
     """
+    import cv2
+
     moments = cv2.moments(lit_mask, binaryImage=True)
     middle = moments["m10"] / moments["m00"] + 0.5, moments["m01"] / moments["m00"] + 0.5
     xx, yy, xy = (moments[name] / moments["m00"] for name in ("mu20", "mu02", "mu11"))

@@ -37,6 +37,8 @@ def chart_figure(chart: Chart) -> Figure:
 
 def _set_axes(axes: Axes, panel: Panel, chart: Chart) -> None:
     """Set limits, ticks and labels."""
+    if panel.x.is_logarithmic:
+        axes.set_xscale("log")
     axes.set_xlim(panel.x.low, panel.x.high)
     if panel.y.is_logarithmic:
         axes.set_yscale("log", nonpositive="clip")

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from labrig.foundation.activity import counted
 from labrig.foundation.errors import UsageError
 from labrig.foundation.output_file import make_folder, make_folder_in, write_durably, write_text
 from labrig.report.chart import Chart
@@ -208,11 +209,13 @@ def write_figures_pdf(path: Path, title: str, sections: Sequence[Section]) -> in
     # Without dates and versions the same figures give the same bytes.
     metadata = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
     content = BytesIO()
-    with figure_style(), PdfPages(content, metadata=metadata) as pdf:
-        for picture in pictures:
+    with figure_style():
+        pdf = PdfPages(content, metadata=metadata)
+        for picture in counted(pictures, "drawing figures"):
             figure = picture.figure()
             figure.patch.set(visible=True, facecolor="white")
             pdf.savefig(figure)
+        pdf.close()  # only a whole one: what an interruption leaves is not finished first
     make_folder(path.parent)
     write_durably(path, content.getvalue())
     return len(pictures)

@@ -9,6 +9,7 @@ import numpy as np
 
 from labrig.fit import LightKept, MixtureCandidate, MixtureFit
 from labrig.foundation.number_format import aligned, rounded
+from labrig.foundation.result_warning import ResultWarning, Undetermined, warning_lines
 from labrig.material import (
     REFERENCE_Y,
     ColourDifference,
@@ -108,8 +109,7 @@ def describe_mixture(fitted: FittedMatrix) -> str:
     if fit.selection == "cross-validation":
         errors = (f"{number}: {rounded(mse, 3)}" for number, mse in held_out_errors(fit.candidates))
         lines.append(f"  held-out MSE  {', '.join(errors)}")
-    if not fit.converged:
-        lines.append(f"  {NOT_CONVERGED}")
+    lines += warning_lines(mixture_warnings(fit), "  ! ")
     if fitted.differences:
         lines += [f"  {line}" for line in difference_lines(fitted.differences)]
     return "\n".join(lines)
@@ -130,7 +130,11 @@ def light_kept_text(kept: LightKept) -> str:
     return f"{total} of all that was measured; worst at {kept.worst_input_nm:g} nm, {worst}"
 
 
-NOT_CONVERGED = "The refinement ended before it reached a minimum."
+def mixture_warnings(fit: MixtureFit) -> tuple[ResultWarning, ...]:
+    """Return a warning about a fit that did not end at a minimum."""
+    if fit.converged:
+        return ()
+    return (Undetermined("fit-unconverged", "the refinement ended before it reached a minimum"),)
 
 
 def component_head(fit: MixtureFit) -> tuple[str, ...]:

@@ -11,13 +11,13 @@ from labrig.optics import Spectrum
 from labrig.record import RunDescription
 from labrig.report.colours import css_colour
 from labrig.report.mixture import (
-    NOT_CONVERGED,
     FittedMatrix,
     component_head,
     component_rows,
     components_text,
     held_out_errors,
     light_kept_text,
+    mixture_warnings,
     selection_text,
     threshold_text,
     white_text,
@@ -94,9 +94,8 @@ def mixture_report(fitted: FittedMatrix, about: RunDescription) -> Report:
     sections = [_mixture(fitted), _spectra(fitted), _numbers(fitted)]
     if fitted.differences:
         sections.insert(1, _colours(fitted))
-    warnings = [] if fitted.fit.converged else [NOT_CONVERGED]
-    warnings += physical_warnings(fitted.matrix)
-    return Report(about, tuple(warnings), tuple(sections), (_methods(fitted),))
+    warnings = (*mixture_warnings(fitted.fit), *physical_warnings(fitted.matrix))
+    return Report(about, warnings, tuple(sections), (_methods(fitted),))
 
 
 def _mixture(fitted: FittedMatrix) -> Section:

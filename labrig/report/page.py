@@ -22,6 +22,7 @@ from labrig.foundation.input_file import read_text
 from labrig.foundation.number_format import plus_minus, rounded
 from labrig.foundation.output_file import write_text
 from labrig.foundation.quantity import duration_text
+from labrig.foundation.result_warning import ResultWarning
 from labrig.optics import CameraResponse
 from labrig.record import FrameRecord, RunDescription
 from labrig.report import parameters
@@ -234,7 +235,7 @@ class Report:
     about
         Description of the run, its bench and the processing.
     warnings
-        Warnings, one line each, shown on top.
+        Warnings, shown on top.
     sections
         Sections with results, in order.
     methods
@@ -246,7 +247,7 @@ class Report:
     """
 
     about: RunDescription
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
     sections: tuple[Section, ...] = ()
     methods: tuple[Section, ...] = ()
     frames: Sequence[FrameRecord] = ()

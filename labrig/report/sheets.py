@@ -207,8 +207,14 @@ def _resized(frame: Bytes) -> Bytes:
 
 
 def _columns(frames: int, width: int, height: int) -> int:
-    """Return the number of columns that makes a sheet about 3 : 2, and its rows full if it can."""
+    """Return the number of columns of a sheet with few empty cells and about 3 : 2."""
     most = max(1, min(frames, (SHEET_PX - GAP_PX) // (width + GAP_PX)))
-    ideal = math.sqrt(1.5 * frames * (height + LABEL_PX) / (width + GAP_PX))
-    columns = min(most, max(1, round(ideal)))
-    return -(-frames // -(-frames // columns))
+
+    def cost(columns: int) -> float:
+        rows = -(-frames // columns)
+        shape = columns * (width + GAP_PX) / (rows * (height + LABEL_PX))
+        empty = rows * columns - frames
+        # A sheet of twice that shape is as bad as one with a quarter of its cells empty.
+        return abs(math.log2(shape / 1.5)) + 4 * empty / (rows * columns)
+
+    return min(range(1, most + 1), key=cost)

@@ -130,7 +130,7 @@ def trap_depth_report(depths: Sequence[StateDepth], about: RunDescription) -> Re
         figures=(Picture("rates-over-temperature", trap_depth_chart(depths), CAPTION),),
         tables=(Table(head, rows, "σ in units of the last places; p of the misfit."),),
     )
-    warnings = tuple(f"{each.name}: {line}" for each in depths for line in each.depth.warnings)
+    warnings = tuple(warning.about(each.name) for each in depths for warning in each.depth.warnings)
     return Report(about, warnings, (section,))
 
 

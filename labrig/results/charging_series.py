@@ -244,16 +244,45 @@ class ChargingSeries:
                 )
         return series
 
+    @property
+    def places(self) -> int:
+        """Number of parts of every site that `spread` makes sites: places within it at depths."""
+        depths = self._depths_of_sites()
+        return (1 if depths is None else len(depths)) * (
+            1 if self.across is None else len(self.across)
+        )
+
+    def _depths_of_sites(self) -> FloatArray | None:
+        """Return `arriving` if the rows of every irradiance are sites, and not selected lights."""
+        earlier = () if self.earlier is None else self.earlier.charges
+        is_of_sites = all(charge.light is None for charge in (*self.charges, *earlier))
+        return self.arriving if is_of_sites else None
+
     def spread(self) -> Self:
-        """Return the series with every place within the sites as a site, place by place."""
-        if self.across is None:
+        """Return the series with every place within the sites at every depth as a site.
+
+        All sites follow each other for each of the `places`. Where one light after another is
+        selected, a row of `irradiance` is no site, and depths remain: see `at_depths`.
+        """
+        if self.places == 1:
             return self
-        irradiance = (self.across * self.irradiance).reshape(-1, self.irradiance.shape[1])
-        earlier = self.earlier
+        depths, earlier = self._depths_of_sites(), self.earlier
+        of_depths = np.ones((1, 1, 1, 1)) if depths is None else depths[:, None, None]
+        across = np.ones((1, 1, 1)) if self.across is None else self.across
+        bands = self.irradiance.shape[1]
         if earlier is not None:
-            everywhere = np.tile(earlier.irradiance, (len(self.across), 1))
-            earlier = replace(earlier, irradiance=everywhere)
-        return replace(self, irradiance=irradiance, across=None, earlier=earlier)
+            everywhere = np.broadcast_to(
+                of_depths * earlier.irradiance,
+                (len(of_depths), len(across), *earlier.irradiance.shape),
+            )
+            earlier = replace(earlier, irradiance=everywhere.reshape(-1, bands))
+        return replace(
+            self,
+            irradiance=(of_depths * across * self.irradiance).reshape(-1, bands),
+            across=None,
+            arriving=self.arriving if depths is None else None,
+            earlier=earlier,
+        )
 
     def at_depths(self) -> list[Self]:
         """Return the series at each depth of the sample, as of a surface in the light there."""

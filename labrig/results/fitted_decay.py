@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.number_format import aligned, rounded
+from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.material import exponential_means_and_slopes
 from labrig.results.decay_timing import DecayReference, UnseenFlicker
 from labrig.results.fitted_law import (
@@ -227,7 +228,7 @@ class FittedDecay:
         Covariance of the `covariance_parameters`; channel weights and the other channels' offsets
         marginalised.
     warnings
-        Limits of the fit and remedies, a line each.
+        Limits of the fit and remedies.
     candidates
         Fits with each number of states that was tried.
     law
@@ -276,7 +277,7 @@ class FittedDecay:
     dof: int
     bic: float
     covariance: FloatArray
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
     candidates: tuple[Candidate, ...]
     law: str
     laws: tuple[FittedLaw, ...]
@@ -615,7 +616,7 @@ class FittedDecay:
             "bic": self.bic,
             "covariance_parameters": list(self.covariance_parameters),
             "covariance": self.covariance.tolist(),
-            "warnings": list(self.warnings),
+            "warnings": [each.to_dict() for each in self.warnings],
             "candidates": [asdict(candidate) for candidate in self.candidates],
             "law": self.law,
             "laws": [law.to_dict() for law in self.laws],
@@ -639,6 +640,10 @@ class FittedDecay:
         return json_text(self.to_dict())
 
     def __str__(self) -> str:
+        """Return the table and the warnings, a line each."""
+        return "\n".join([self.table(), *warning_lines(self.warnings)])
+
+    def table(self) -> str:
         """Return a table for people; digits in brackets are σ in units of the last places."""
         rows = [
             [
@@ -675,10 +680,16 @@ class FittedDecay:
             lines += wrap(origin, LINE_WIDTH, subsequent_indent=" " * 9)
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         if self.other_laws:
-            lines += aligned([["law", "", "reduced χ²", "BIC"], *self._law_rows()])
+            lines += aligned([["law (* taken)", "", "reduced χ²", "BIC"], *self._law_rows()])
+            if self.compared_laws[0].name != self.law:
+                why = (
+                    f"{LAW_LABELS[self.compared_laws[0].name]} has the lowest BIC and is not "
+                    "taken: a law replaces another one where its BIC is lower by a margin, or it "
+                    "was asked for"
+                )
+                lines += wrap(why, LINE_WIDTH)
         for outside in filter(None, (self.outside_sigma, str(self.unseen_flicker or ""))):
             lines += wrap(f"not in σ {outside}", LINE_WIDTH, subsequent_indent=" " * 9)
-        lines += [f"! {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
     def _law_rows(self) -> list[list[str]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from labrig.foundation.errors import DataError, LabrigError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.result_warning import as_warnings
 from labrig.results.decay_timing import DecayReference, UnseenFlicker
 from labrig.results.fitted_decay import (
     SCHEMA_VERSION,
@@ -209,7 +210,7 @@ def _from_dict(content: Any) -> FittedDecay:
             [[_number_or(value) for value in row] for row in content["covariance"]],
             dtype=np.float64,
         ),
-        warnings=tuple(content["warnings"]),
+        warnings=as_warnings(content["warnings"]),
         candidates=tuple(
             Candidate(
                 **candidate | {"reduced_chi2": _number_or(candidate["reduced_chi2"], math.nan)}

@@ -9,6 +9,7 @@ import numpy as np
 from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
 from labrig.foundation.detection import RATE_LIMIT_SIGMA
 from labrig.foundation.number_format import rounded
+from labrig.foundation.result_warning import ResultWarning
 from labrig.material import MAX_ORDER
 from labrig.results.interval import ProfileInterval
 from labrig.results.measured import Measured, OneSided
@@ -286,7 +287,7 @@ class FittedExcitation:
     covariance
         Covariance of the `covariance_parameters`.
     warnings
-        Limits of the fit and remedies, a line each.
+        Limits of the fit and remedies.
     residuals
         Residuals of every series in σ without flicker, shape (n, P, C) each.
     order_gain
@@ -319,7 +320,7 @@ class FittedExcitation:
     chi2: float
     dof: int
     covariance: FloatArray
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
     residuals: tuple[FloatArray, ...]
     by_band: BandTests | None
     veil: Measured | None

@@ -13,6 +13,7 @@ from scipy.special import ndtr
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import aligned
 from labrig.foundation.quantity import TIME_S, duration_text, parse
+from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.results.budget import Budget
 from labrig.results.interval import NORMAL_95
 from labrig.results.measured import Measured
@@ -231,7 +232,7 @@ class LuminanceDecay:
     origin
         Origin of the readings, a file or a run; empty if not given.
     warnings
-        Doubts, a sentence each.
+        Limits of the results and remedies.
     """
 
     t_s: FloatArray
@@ -247,7 +248,7 @@ class LuminanceDecay:
     colours: str
     excitation: str
     origin: str
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
     @property
     def marking(self) -> str | None:
@@ -285,6 +286,10 @@ class LuminanceDecay:
         return budgets
 
     def __str__(self) -> str:
+        """Return the table and the warnings, a line each."""
+        return "\n".join([self.table(), *warning_lines(self.warnings)])
+
+    def table(self) -> str:
         """Return a table for people."""
         marking = self.marking or "none: luminances at 10 and 60 min are missing"
         rows = [["marking", marking], ["luminance", "after lamp off"]]
@@ -306,7 +311,7 @@ class LuminanceDecay:
             ]
             for requirement, entry in self.required
         ]
-        return "\n".join([*aligned(rows), *(f"! {line}" for line in self.warnings)])
+        return "\n".join(aligned(rows))
 
     def _visible_text(self) -> str:
         if self.visible_s is not None:
@@ -344,7 +349,7 @@ class LuminanceDecay:
                     }
                     for requirement, entry in self.required
                 ],
-                "warnings": list(self.warnings),
+                "warnings": [each.to_dict() for each in self.warnings],
             }
         )
         return content

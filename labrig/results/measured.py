@@ -7,7 +7,14 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from labrig.foundation.number_format import plus_minus
+from labrig.foundation.number_format import (
+    VANISHES_SIGMAS,
+    as_written,
+    plus_minus,
+    power_of_ten,
+    rounded,
+)
+from labrig.foundation.result_warning import ResultWarning
 from labrig.results.run_result import RunResult
 
 #: Fewest decimals of a rounded value; a larger σ is written with a power of ten.
@@ -192,9 +199,11 @@ def with_uncertainty(value: float, sigma: float) -> str:
     ('0.0802(13)', '12.5(1.3)', '0.08')
     """
     if sigma == 0:
-        return f"{value:.6g}"
+        return as_written(f"{value:.6g}")
     if not math.isfinite(sigma):
-        return f"{value:.3g}(?)"
+        return f"{rounded(value, 3)}(?)"
+    if 0 < abs(value) < VANISHES_SIGMAS * sigma:
+        return plus_minus(value, sigma)
     decimals = 1 - math.floor(math.log10(sigma))
     digits = round(sigma * 10.0**decimals)
     if digits == 100:
@@ -202,15 +211,19 @@ def with_uncertainty(value: float, sigma: float) -> str:
     if decimals > 8:
         exponent = math.floor(math.log10(abs(value))) if value else 0
         if exponent < -3:
-            return f"{with_uncertainty(value / 10.0**exponent, sigma / 10.0**exponent)}e{exponent}"
+            return _with_power(value, sigma, exponent)
     if decimals < MAX_ROUNDED:
-        exponent = math.floor(math.log10(max(abs(value), sigma)))
-        return f"{with_uncertainty(value / 10.0**exponent, sigma / 10.0**exponent)}e{exponent}"
+        return _with_power(value, sigma, math.floor(math.log10(max(abs(value), sigma))))
     if decimals < 0:
-        return f"{round(value, decimals):.0f}({digits * 10**-decimals})"
+        return as_written(f"{round(value, decimals):.0f}({digits * 10**-decimals})")
     # σ of 1 and more is written with its decimal point, as in 12.5(1.3).
     bracket = f"{sigma:.{decimals}f}" if decimals > 0 and sigma >= 1 else str(digits)
-    return f"{value:.{decimals}f}({bracket})"
+    return as_written(f"{value:.{decimals}f}({bracket})")
+
+
+def _with_power(value: float, sigma: float, exponent: int) -> str:
+    scale = 10.0**exponent
+    return f"{with_uncertainty(value / scale, sigma / scale)} × {power_of_ten(exponent)}"
 
 
 #: Ends of the names of fields, longest first, and the unit that they stand for.
@@ -296,7 +309,7 @@ def field_unit(name: str) -> str:
 
 def _members(value: Any) -> list[tuple[str, Any]] | None:
     """Return the named values in a value; None for a plain one."""
-    if isinstance(value, Measured):
+    if isinstance(value, Measured | ResultWarning):
         return None
     if isinstance(value, BaseModel):
         return [(name, getattr(value, name)) for name in type(value).model_fields]

@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
@@ -13,6 +14,7 @@ from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.foundation.output_file import make_folder_in, write_text
 from labrig.foundation.plugins import measurement
+from labrig.foundation.result_warning import ResultWarning, as_warnings
 from labrig.results.text_files import finite
 
 if TYPE_CHECKING:
@@ -37,7 +39,7 @@ class RunResult:
     schema_version
         Version of the type's fields: another number means renamed fields or other meanings.
     warnings
-        Limits of the result and remedies, a line each.
+        Limits of the result and remedies. A package may give plain texts.
     """
 
     kind: ClassVar[str]
@@ -46,7 +48,10 @@ class RunResult:
         arbitrary_types_allowed=True, extra="forbid", ser_json_inf_nan="strings"
     )
 
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "warnings", as_warnings(self.warnings))
 
     def provides(self) -> Mapping[str, Any]:
         """Return values for later parts of a chain, by the name of a field of their `Inputs`."""
@@ -74,7 +79,7 @@ class RunResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `result.json`, in which infinity and NaN are texts."""
-        fields = TypeAdapter(type(self)).dump_python(self, mode="json")
+        fields = _adapter(type(self)).dump_python(self, mode="json")
         content: dict[str, Any] = finite(
             {
                 "kind": self.kind,
@@ -112,7 +117,14 @@ class RunResult:
                 f"a result of '{kind}', version {version}, not of '{cls.kind}', version "
                 f"{cls.schema_version}"
             )
-        return TypeAdapter(cls).validate_python(fields)
+        read: Self = _adapter(cls).validate_python(fields)
+        return read
+
+
+@cache
+def _adapter(result_type: type[RunResult]) -> TypeAdapter[Any]:
+    """Return the reader and writer of a type: to build it takes longer than to read a result."""
+    return TypeAdapter(result_type)
 
 
 def _to_own_type(content: Any) -> RunResult:

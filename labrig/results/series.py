@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import ResultWarning
 from labrig.results.table_clock import TableClock
 from labrig.results.text_files import write_csv
 
@@ -63,7 +64,7 @@ class Series:
     value_unit
         Unit of `values`, which their columns in series.csv have in brackets; empty if unknown.
     warnings
-        What is to be said of the rows that were read, such as those left out. Not in series.csv.
+        Limits of the rows that were read, such as those left out. Not in series.csv.
     clock
         Clock by which the table counts that was read. Not a column of series.csv.
     """
@@ -83,7 +84,7 @@ class Series:
     correlation: FloatArray | None = None
     dark_correlation: FloatArray | None = None
     value_unit: str = "DN/s"
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
     clock: TableClock = field(default=TableClock())
 
     def __post_init__(self) -> None:

@@ -335,11 +335,11 @@ def _measured_series(table: Block, columns: Columns) -> list[Series]:
     warnings = [*(clock.warnings if clock else ()), *warnings]
     if len(parts) == 1:
         resolution_s = clock.resolution_s if clock else 0.0
-        independent, said = independent_rows(parts[0], measured.lines, resolution_s)
+        independent, repeats = independent_rows(parts[0], measured.lines, resolution_s)
         lines = [measured.lines[row] for row in independent]
         part, limits = with_limits(parts[0].take(independent), lines)
         parts = [part]
-        warnings += [*said, *limits]
+        warnings += [*repeats, *limits]
     return [replace(part, warnings=tuple(warnings)) for part in parts]
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import aligned
+from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.material import exponential_means
 from labrig.results.decay_timing import DecayReference
 from labrig.results.fitted_decay import Candidate, DecayState
@@ -80,7 +81,7 @@ class SharedDecay:
     candidates
         Fits with each number of states that was tried.
     warnings
-        Limits of the fit, a line each.
+        Limits of the fit and remedies.
     """
 
     tables: tuple[TableDecay, ...]
@@ -90,7 +91,7 @@ class SharedDecay:
     covariance_parameters: tuple[str, ...]
     covariance: FloatArray
     candidates: tuple[Candidate, ...]
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
     @property
     def rates(self) -> tuple[Measured, ...]:
@@ -120,7 +121,7 @@ class SharedDecay:
             "covariance_parameters": list(self.covariance_parameters),
             "covariance": self.covariance.tolist(),
             "candidates": [asdict(candidate) for candidate in self.candidates],
-            "warnings": list(self.warnings),
+            "warnings": [each.to_dict() for each in self.warnings],
         }
         return json_text(finite(fields))
 
@@ -157,7 +158,11 @@ class SharedDecay:
         ]
 
     def __str__(self) -> str:
+        """Return the tables and the warnings, a line each."""
+        return "\n".join([self.table(), *warning_lines(self.warnings)])
+
+    def table(self) -> str:
         """Return tables for people; digits in brackets are σ in units of the last places."""
         lines = [*aligned(self.rate_rows()), *aligned(self.table_rows())]
         lines.append(f"reduced χ² {self.chi2 / self.dof:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
-        return "\n".join([*lines, *(f"! {warning}" for warning in self.warnings)])
+        return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Rows of another program's table that are measurements, and what is said of the others."""
+"""Rows of another program's table that are measurements, and warnings about the others."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.foundation.errors import UsageError
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Undetermined, Unmeasured
 from labrig.results.series import Series, add_flag
 from labrig.text_table import Block
 from labrig.text_table.rows import (
@@ -31,7 +32,7 @@ _REGULAR = 1.5
 _SHARED = 0.2
 
 
-def measured_rows(table: Block, columns: Sequence[int]) -> tuple[Rows, list[str]]:
+def measured_rows(table: Block, columns: Sequence[int]) -> tuple[Rows, list[ResultWarning]]:
     """Return the rows of a table where no column holds a mark for no measurement.
 
     Parameters
@@ -45,8 +46,8 @@ def measured_rows(table: Block, columns: Sequence[int]) -> tuple[Rows, list[str]
     -------
     rows : ndarray of int
         Indices of the rows that are measurements.
-    warnings : list of str
-        What the others hold.
+    warnings : list of ResultWarning
+        Marks in the other rows.
     """
     marks: dict[int, str] = {}
     for column in columns:
@@ -62,14 +63,20 @@ def measured_rows(table: Block, columns: Sequence[int]) -> tuple[Rows, list[str]
             f"expected measurements, got only '{next(iter(by_cell))}'; was the detector overloaded?"
         )
     return rows, [
-        f"{_lines(lines)}: '{cell}' is no measurement; {_rows(len(lines))} left out"
+        Unmeasured(
+            "row-without-value",
+            "'{cell}' is no measurement; rows left out: {left_out}",
+            _lines(lines),
+            cell=cell,
+            left_out=len(lines),
+        )
         for cell, lines in by_cell.items()
     ]
 
 
 def independent_rows(
     series: Series, lines: Sequence[int], resolution_s: float
-) -> tuple[Rows, list[str]]:
+) -> tuple[Rows, list[ResultWarning]]:
     """Return the rows of one series that are measurements of their own.
 
     Parameters
@@ -85,8 +92,8 @@ def independent_rows(
     -------
     rows : ndarray of int
         Indices of the rows that repeat no other row.
-    warnings : list of str
-        What was left out, and what times cannot tell.
+    warnings : list of ResultWarning
+        Rows that were left out, and times that are uncertain.
 
     Raises
     ------
@@ -98,26 +105,39 @@ def independent_rows(
     if repeated.any():
         which = [lines[row] for row in np.flatnonzero(repeated).tolist()]
         warnings.append(
-            f"{_lines(which)}: the row before once more, with its time and value; "
-            f"{_rows(len(which))} left out"
+            Disturbance(
+                "row-repeated",
+                "the row before once more, with its time and value; rows left out: {left_out}",
+                _lines(which),
+                left_out=len(which),
+            )
         )
     shared = float(np.mean(np.append(False, np.diff(series.t_s) == 0) & ~repeated))
     if resolution_s and shared > _SHARED:
         warnings.append(
-            f"rows share their time, since the clock shows steps of {resolution_s:g} s: times are "
-            "uncertain by as much; export them with more digits"
+            Undetermined(
+                "clock-too-coarse",
+                "rows share their time, since the clock shows steps of {resolution_s:g} s: times "
+                "are uncertain by as much; export them with more digits",
+                resolution_s=resolution_s,
+            )
         )
     held = _held(series, ~repeated)
     if held.any():
         which = [lines[row] for row in np.flatnonzero(held).tolist()]
         warnings.append(
-            f"{_lines(which)}: equal to the row before though neighbours differ, as a logger "
-            f"writes that is faster than its meter; {_rows(len(which))} left out"
+            Disturbance(
+                "reading-held",
+                "equal to the row before though neighbours differ, as a logger writes that is "
+                "faster than its meter; rows left out: {left_out}",
+                _lines(which),
+                left_out=len(which),
+            )
         )
     return np.flatnonzero(~(repeated | held)), warnings
 
 
-def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[str]]:
+def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[ResultWarning]]:
     """Return the series of one channel with values at the limits of its detector flagged.
 
     Parameters
@@ -130,7 +150,7 @@ def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[str]
     order = np.argsort(series.t_s, kind="stable")
     if len(series.channels) > 1 or len(set(series.exposure_s)) > 1 or not _is_course(series.t_s):
         return series, []
-    warnings = []
+    warnings: list[ResultWarning] = []
     flags = list(series.flag)
     for limit, name in ((at_ceiling, "ceiling"), (at_floor, "floor")):
         if name == "floor" and not _is_regular(series.t_s):
@@ -139,10 +159,15 @@ def with_limits(series: Series, lines: Sequence[int]) -> tuple[Series, list[str]
         if not len(rows):
             continue
         warnings.append(
-            f"{_lines([lines[row] for row in np.sort(rows).tolist()])}: equal, "
-            f"{series.values[rows[0], 0]:.6g}, and far from the values beside: the detector was "
-            f"{'saturated' if name == 'ceiling' else 'at its lowest value'}; {_rows(len(rows))} "
-            "left out"
+            Disturbance(
+                "detector-clipped",
+                "equal, {level:.6g}, and far from the values beside: the detector was {state}; "
+                "rows left out: {left_out}",
+                _lines([lines[row] for row in np.sort(rows).tolist()]),
+                level=series.values[rows[0], 0],
+                state="saturated" if name == "ceiling" else "at its lowest value",
+                left_out=len(rows),
+            )
         )
         for row in rows.tolist():
             flags[row] = add_flag(flags[row], CLIPPED)
@@ -163,21 +188,27 @@ def _is_regular(t_s: npt.NDArray[np.float64]) -> bool:
     return _is_course(t_s) and bool(high <= _REGULAR * low)
 
 
-def _of_order(series: Series, lines: Sequence[int]) -> list[str]:
-    """Return what is to be said of times that go back."""
-    warnings = []
+def _of_order(series: Series, lines: Sequence[int]) -> list[ResultWarning]:
+    """Return warnings about times that go back."""
+    warnings: list[ResultWarning] = []
     for row in backward_rows(series.t_s).tolist():
-        before, after = (f"{series.t_s[index]:.6g} s" for index in (row - 1, row))
+        before_s, after_s = series.t_s[row - 1], series.t_s[row]
         if not starts_again(series.t_s, row):
             warnings.append(
-                f"line {lines[row]}: the time goes back from {before} to {after}, and rows are "
-                "taken by their times: was the clock set?"
+                Disturbance(
+                    "time-goes-back",
+                    "the time goes back from {before_s:.6g} s to {after_s:.6g} s, and rows are "
+                    "taken by their times: was the clock set?",
+                    _lines([lines[row]]),
+                    before_s=before_s,
+                    after_s=after_s,
+                )
             )
         elif light_goes_on(series.values[:, 0], row):
             raise UsageError(
-                f"line {lines[row]}: expected times that go on, got {after} after {before} while "
-                "the light goes on to fall: did a counter run over? Add what is missing to the "
-                "times that follow"
+                f"line {lines[row]}: expected times that go on, got {after_s:.6g} s after "
+                f"{before_s:.6g} s while the light goes on to fall: did a counter run over? Add "
+                "the missing time to those that follow"
             )
     return warnings
 
@@ -198,7 +229,3 @@ def _lines(lines: Sequence[int]) -> str:
         return f"lines {lines[0]} to {lines[-1]}"
     named = ", ".join(map(str, lines[:_NAMED]))
     return f"lines {named}{', …' if len(lines) > _NAMED else ''}"
-
-
-def _rows(number: int) -> str:
-    return "1 row is" if number == 1 else f"{number} rows are"

@@ -9,6 +9,7 @@ import numpy as np
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import aligned, rounded
 from labrig.foundation.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
+from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.results.budget import Budget
 from labrig.results.measured import Measured
 from labrig.results.text_files import finite, json_text
@@ -34,7 +35,7 @@ class TrapDepth:
     chi2, dof, p_value
         Misfit, degrees of freedom, and the chance of a larger misfit; NaN of two temperatures.
     warnings
-        Doubts, a sentence each.
+        Limits of the depth and remedies.
     """
 
     temperature_c: FloatArray
@@ -48,7 +49,7 @@ class TrapDepth:
     chi2: float
     dof: int
     p_value: float
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
     def rate_at(self, temperature_c: float) -> Measured:
         """Return the rate at a temperature in °C, with σ."""
@@ -64,6 +65,10 @@ class TrapDepth:
         return Budget(self.depth_ev.value, "eV", undivided=self.depth_ev.sigma)
 
     def __str__(self) -> str:
+        """Return the table and the warnings, a line each."""
+        return "\n".join([self.table(), *warning_lines(self.warnings)])
+
+    def table(self) -> str:
         """Return a table for people."""
         low, high = self.temperature_c[[0, -1]]
         misfit = (
@@ -81,7 +86,7 @@ class TrapDepth:
             ["temperatures", f"{len(self.temperature_c)}, {low:.1f} °C to {high:.1f} °C"],
             ["misfit", misfit],
         ]
-        return "\n".join([*aligned(rows), *(f"! {line}" for line in self.warnings)])
+        return "\n".join(aligned(rows))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the state in `trap_depth.json`."""
@@ -99,7 +104,7 @@ class TrapDepth:
                 "chi2": self.chi2,
                 "dof": self.dof,
                 "p_value": self.p_value,
-                "warnings": list(self.warnings),
+                "warnings": [each.to_dict() for each in self.warnings],
             }
         )
         return content

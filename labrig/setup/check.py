@@ -19,6 +19,7 @@ from labrig.acquire import (
     Suggestion,
 )
 from labrig.bench import Bench
+from labrig.foundation.activity import counted
 from labrig.foundation.errors import DeviceError, LabrigError
 from labrig.record import size_text
 from labrig.reduce import FrameMeasurement, measure, read_raw
@@ -249,7 +250,11 @@ def check_rig(bench: Bench) -> RigReport:
 def _checked_rig(rig: Rig) -> RigReport:
     context = ExerciseContext(rig.clock, Photographs())
     return RigReport(
-        rig.name, tuple(_checked(key, device, context) for key, device in rig.devices.items())
+        rig.name,
+        tuple(
+            _checked(key, device, context)
+            for key, device in counted(list(rig.devices.items()), "checking devices")
+        ),
     )
 
 

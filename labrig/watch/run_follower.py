@@ -2,26 +2,28 @@
 
 import math
 import shutil
-from bisect import bisect_left
-from collections import Counter, defaultdict
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from labrig.acquire import (
+    Continuation,
     ExposureSettings,
     Plan,
+    PlanClock,
     ProtocolModel,
-    Step,
     plan,
     read_protocol,
     read_rig_file,
+    step_text,
 )
 from labrig.catalogue import RunStatus, status_of
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.region import Region
-from labrig.record import PERSON, ActionRecord, Attempt, FrameRecord, FrameRole, RunRecord, read_run
+from labrig.record import UNDONE, ActionRecord, Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.results import parameter_text, read_fitted_decays
 from labrig.watch.preview import Preview, glance
@@ -29,34 +31,28 @@ from labrig.watch.preview import Preview, glance
 #: Largest numbers of past and coming steps, as many as the page shows.
 MAX_DONE = 2
 MAX_NEXT = 6
-#: Devices of steps that are waits, and of choices of the protocol.
-WAITING, FINDING = "-", "protocol"
-#: Key by which a step of the plan is found for a journal line.
-_Key = tuple[str, str]
+#: Device of the protocol's choices.
+CHOICE = "protocol"
+#: Longest time between two units of one connection; to connect devices anew takes longer.
+BETWEEN_UNITS_S = 1.0
 
 
 @dataclass(frozen=True)
-class PlannedUnit:
-    """One unit of a plan.
+class Course:
+    """Plan of what was left of a run as an attempt began.
 
     Attributes
     ----------
-    name
-        Name of the unit.
-    begins_s
-        Begin of the unit in seconds after the start of the run.
-    duration_s
-        Longest duration of the unit in seconds.
-    steps
-        Steps of the unit, with times from the start of the run.
+    plan
+        Plan of the units that were missing then.
+    uid
+        Uid of the attempt.
     """
 
-    name: str
-    begins_s: float
-    duration_s: float
-    steps: tuple[Step, ...]
+    plan: Plan
+    uid: str
 
-    def status_of_unit(self, attempt: Attempt) -> dict[str, Any]:
+    def status_of(self, attempt: Attempt) -> dict[str, Any]:
         """Return the last and the next steps of an attempt that is under way.
 
         The progress is that of the journal: the time that a person takes is not known, and a plan
@@ -68,80 +64,52 @@ class PlannedUnit:
             `done`: last steps, each with its `time` in seconds since 1970. `next`: next steps, each
             with its planned time `at_s` in seconds after the begin of the unit. `time` and `at_s`:
             time and planned time of the last step; `until_s`: planned time at which the next line
-            of the journal is due.
+            of the journal is due. `ends_s`: planned end of the run. `by_hand`: next step by hand in
+            this unit or a later one, with its planned time; None if there is none.
         """
-        position, time, at_s = 0, float(attempt.start["time"]), 0.0
-        places: defaultdict[_Key, list[int]] = defaultdict(list)
-        for number, step in enumerate(self.steps):
-            places[_key(step.device, step.action)].append(number)
+        began_time = float(attempt.start["time"])
+        clock, begins_s = PlanClock(self.plan), self.plan.begins_s(attempt.unit)
+        clock.begin_unit(attempt.unit, began_time)
         records: list[ActionRecord | FrameRecord] = [*attempt.actions, *attempt.frames]
         records.sort(key=lambda record: record.start_time)
         for record in records:
-            candidates = places[_key_of(record)]
-            index = bisect_left(candidates, position)
-            if index < len(candidates):
-                number = candidates[index]
-                position, time, at_s = (
-                    number + 1,
-                    record.start_time,
-                    self.steps[number].at_s - self.begins_s,
-                )
-        coming = [step for step in self.steps[position:] if step.device != FINDING]
-        due = next((step.at_s for step in coming if step.device != WAITING), None)
-        past = [record for record in records if _device(record) != FINDING]
+            clock.begin_step(_text_of(record), record.start_time)
+        time = records[-1].start_time if records else began_time
+        at_s = clock.at_s(time)
+        past = [record for record in records if _device(record) != CHOICE]
+        by_hand = clock.next_by_hand(time)
         return {
-            "began_time": attempt.start["time"],
+            "began_time": began_time,
             "time": time,
-            "at_s": at_s,
-            "until_s": self.duration_s if due is None else due - self.begins_s,
+            "at_s": at_s - begins_s,
+            "until_s": clock.waits_at_s - begins_s,
+            "ends_s": self.plan.duration_s - begins_s,
             "done": [
                 {"time": record.start_time, "what": _text_of(record)} for record in past[-MAX_DONE:]
             ],
             "next": [
-                {"at_s": step.at_s - self.begins_s, "what": step_text(step.device, step.action)}
-                for step in coming[:MAX_NEXT]
+                {"at_s": step.at_s - begins_s, "what": step_text(step.device, step.action)}
+                for step in islice(clock.coming(), MAX_NEXT)
             ],
+            "by_hand": by_hand and {"at_s": at_s + by_hand.in_s - begins_s, "what": by_hand.what},
         }
 
 
-def planned_units(plan: Plan) -> tuple[PlannedUnit, ...]:
-    """Return the units of a plan, each with its steps."""
-    steps: defaultdict[str, list[Step]] = defaultdict(list)
-    for step in plan.steps:
-        steps[step.unit].append(step)
-    begins = (0.0, *plan.unit_ends_s)
-    return tuple(
-        PlannedUnit(name, begin_s, end_s - begin_s, tuple(steps[name]))
-        for name, begin_s, end_s in zip(plan.units, begins, plan.unit_ends_s, strict=False)
-    )
+def connected_at(attempts: Sequence[Attempt]) -> int:
+    """Return the number of the attempt with which the present connection of the devices began.
 
-
-def step_text(device: str, action: str) -> str:
-    """Return a step as text."""
-    if device == PERSON:
-        return f"by hand: {action}"
-    return action if device in (WAITING, "camera") else f"{device} {action}"
-
-
-def _key(device: str, action: str) -> _Key:
-    """Return the key by which a step of the plan is found for a journal line.
-
-    The key of a frame has only its role, that of a choice its question, that of a person nothing:
-    exposures, answers and remarks are known after the plan was made.
+    The journal has no line of a connection. Units of one connection follow each other at once,
+    after one that is complete or was taken back.
     """
-    if device == "camera":
-        return device, action.partition(" frame")[0]
-    if device == FINDING:
-        return device, action.partition(":")[0]
-    return device, "" if device == PERSON else action
-
-
-def _key_of(record: ActionRecord | FrameRecord) -> _Key:
-    return (
-        ("camera", record.role)
-        if isinstance(record, FrameRecord)
-        else _key(record.device, record.action)
-    )
+    for number in range(len(attempts) - 1, 0, -1):
+        before, attempt = attempts[number - 1], attempts[number]
+        if any(action.device == UNDONE for action in before.actions):
+            continue
+        begins_time = float(attempt.start["time"])
+        is_late = begins_time - (before.stop_time or 0.0) > BETWEEN_UNITS_S
+        if not before.completed or is_late:
+            return number
+    return 0
 
 
 def _device(record: ActionRecord | FrameRecord) -> str:
@@ -191,11 +159,11 @@ class RunFollower:
         self._protocol: ProtocolModel = read_protocol(run / "protocol.yaml")
         rig = read_rig_file(run / "rig.yaml")
         self._is_simulated = rig.simulation is not None
-        laid_out = plan(self._protocol, rig, str(run / "rig.yaml"))
-        self._planned_frames = laid_out.frames
-        self._units: tuple[PlannedUnit, ...] = planned_units(laid_out)
+        self._rig = rig
+        self._plan = plan(self._protocol, rig, str(run / "rig.yaml"))
+        self._course: Course | None = None
         self._patches: dict[str, Mapping[str, Region]] = {
-            unit: self._protocol.patches_of(unit) for unit in laid_out.units
+            unit: self._protocol.patches_of(unit) for unit in self._plan.units
         }
         self._last_look: tuple[object, ...] = ()
         self._record = RunRecord(run, [], False, 0.0)
@@ -217,7 +185,7 @@ class RunFollower:
         sizes = _size(self.run / "journal.jsonl"), _size(self.run / "result" / "report.html")
         if sizes[0] and sizes != self._last_look[:2]:
             self._record = read_run(self.run)
-        is_complete = len(self._record.completed()) == len(self._units)
+        is_complete = len(self._record.completed()) == len(self._plan.units)
         self._status = status_of(self._record, is_complete=is_complete)
         is_new = (*sizes, self._status) != self._last_look
         self._last_look = (*sizes, self._status)
@@ -239,7 +207,7 @@ class RunFollower:
                 "last_time": self._record.last_time,
                 "frames": len(frames),
                 "discarded_frames": all_frames - len(frames),
-                "planned_frames": self._planned_frames,
+                "planned_frames": self._plan.frames,
                 "disk_free_bytes": shutil.disk_usage(self.run).free,
                 "now": None if current is None else self._unit_status(current),
             },
@@ -265,29 +233,48 @@ class RunFollower:
         return [*self._record.completed().values(), *([] if current is None else [current])]
 
     def _unit_status(self, attempt: Attempt) -> dict[str, Any] | None:
-        for number, unit in enumerate(self._units):
-            if unit.name == attempt.unit:
-                return {"unit": number, **unit.status_of_unit(attempt)}
-        return None
+        if attempt.unit not in self._plan.units:
+            return None
+        course = self._course_of(attempt)
+        return {"unit": self._plan.units.index(attempt.unit), **course.status_of(attempt)}
+
+    def _course_of(self, attempt: Attempt) -> Course:
+        """Return the plan of what is left since the begin of an attempt."""
+        if self._course is None or self._course.uid != attempt.uid:
+            attempts = self._record.attempts
+            before = attempts[: attempts.index(attempt)]
+            connected = attempts[connected_at(attempts)]
+            begun = replace(attempt, frames=[], actions=[])
+            goes_on = Continuation(
+                replace(self._record, attempts=[*before, begun]),
+                connected_time=float(connected.start["time"]),
+                time=float(attempt.start["time"]),
+            )
+            source = str(self.run / "rig.yaml")
+            rest = plan(self._protocol, self._rig, source, continuation=goes_on)
+            self._course = Course(rest, attempt.uid)
+        return self._course
 
     def _unit_states(
         self, completed: Mapping[str, Attempt], current: Attempt | None
     ) -> dict[str, dict[str, Any]]:
-        """Return the state of every unit by its number."""
+        """Return the state of every unit by its number, as planned now or else at the beginning."""
         tries = Counter(attempt.unit for attempt in self._record.attempts)
+        rest = self._plan if self._course is None else self._course.plan
         states = {}
-        for number, unit in enumerate(self._units):
-            if current is not None and unit.name == current.unit:
+        for number, unit in enumerate(self._plan.units):
+            if current is not None and unit == current.unit:
                 state = "now"
-            elif unit.name in completed:
+            elif unit in completed:
                 state = "done"
             else:
-                state = "again" if tries[unit.name] else "to do"
+                state = "again" if tries[unit] else "to do"
+            planned = rest if unit in rest.units else self._plan
             states[str(number)] = {
-                "name": unit.name,
+                "name": unit,
                 "state": state,
-                "planned_s": unit.duration_s,
-                "tries": tries[unit.name],
+                "planned_s": planned.ends_s(unit) - planned.begins_s(unit),
+                "tries": tries[unit],
             }
         return states
 

@@ -2,8 +2,8 @@
 // again by itself, for what it lacks, when the connection breaks.
 
 import { draw, sample } from "./watch_plot.js";
-import { leftS, showUnits } from "./watch_units.js";
-import { duration, exposure, grouped, tag } from "./watch_words.js";
+import { showUnits } from "./watch_units.js";
+import { duration, exposure, grouped, tag, timeOfDay } from "./watch_words.js";
 
 const $ = (id) => document.getElementById(id);
 const NOTHING_NEXT = {
@@ -136,8 +136,11 @@ function showProgress() {
   const at = position();
   showSteps();
   showUnits($("units"), units, at);
-  const left = units.reduce((sum, unit) => sum + leftS(unit, at), 0);
-  $("left-s").textContent = left > 0 && run.status === "running" ? `${duration(left)} left, as planned` : "";
+  const left = run.now ? run.now.ends_s - at : 0;
+  $("left-s").textContent = left > 0 ? `${duration(left)} left, as planned` : "";
+  const byHand = run.now?.by_hand;
+  const due = byHand ? new Date(1000 * (now() + byHand.at_s - at)) : null;
+  $("by-hand").textContent = due ? `Next by hand at ${timeOfDay(due)}: ${byHand.what}` : "";
   const not = run.discarded_frames ? `; ${run.discarded_frames} more do not count` : "";
   $("frames").textContent = `${run.frames} of at most ${run.planned_frames} frames${not}`;
   $("disk").textContent = `${(run.disk_free_bytes / 1e9).toFixed(1)} GB free on the disk`;

@@ -52,7 +52,7 @@ function saidOf(unit, at) {
 }
 
 /** What is still planned for a unit, in seconds; `at` is where the current one stands. */
-export function leftS(unit, at) {
+function leftS(unit, at) {
   if (unit.state === "done") return 0;
   return unit.planned_s - (unit.state === "now" ? at : 0);
 }

@@ -27,3 +27,8 @@ export function grouped(items, key) {
   }
   return groups;
 }
+
+/** A time of day by the clock on the wall. */
+export function timeOfDay(date) {
+  return date.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
+}

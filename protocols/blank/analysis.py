@@ -16,6 +16,7 @@ from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND, BlankFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.protocols.blank.protocol import BLANK_FRAMES
 from labrig.protocols.blank.result import BlankResult, StrayLight
 from labrig.reduce import (
@@ -170,10 +171,11 @@ def _rows_until_clean(light: StrayLight) -> "np.ndarray[tuple[int], np.dtype[np.
     return rows
 
 
-def _warnings(file: BlankFile, light: StrayLight) -> Iterator[str]:
+def _warnings(file: BlankFile, light: StrayLight) -> Iterator[ResultWarning]:
     if light.fades:
-        yield (
+        yield Disturbance(
+            "blank-still-fades",
             "the blank still gets darker at its end: the lamp glows on for long (use a shield), or "
-            "the card itself glows (take another); record it for longer"
+            "the card itself glows (take another); record it for longer",
         )
     yield from file.leaks()

@@ -43,5 +43,5 @@ def analyse(context: AnalysisContext) -> CalibrationCheckResult:
         calibration=reference.run or protocol.reference,
         age_h=reference.age_s(frames[0].start_time) / 3600,
         change=change,
-        warnings=tuple(text for _, text in broken_rules(change, rules)),
+        warnings=tuple(warning for _, warning in broken_rules(change, rules)),
     )

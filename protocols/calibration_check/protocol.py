@@ -14,6 +14,7 @@ from labrig.fit.lvf import compare_card_pictures, place_means
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.named_files import FilePath
 from labrig.foundation.quantity import Count, DurationS
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.protocols.steps.bench_configuration import (
     BenchConfiguration,
     ConfiguredProtocol,
@@ -107,12 +108,12 @@ class CheckUnit(SceneUnit):
             A rule of the rig file is broken.
         """
         none: tuple[tuple[str, str], ...] = ()
-        told = session.decide("broken rules", lambda: self._broken(session), when_planned=none)
+        broken = session.decide("broken rules", lambda: self._broken(session), when_planned=none)
         rules = self.protocol.rules or CalibrationRules()
-        for rule, text in told:
+        for rule, text in broken:
             if rule in rules.only_warn:
                 session.warn(text)
-        if refused := [text for rule, text in told if rule not in rules.only_warn]:
+        if refused := [text for rule, text in broken if rule not in rules.only_warn]:
             raise DataError(f"{'; '.join(refused)}; {ANEW}")
 
     def _broken(self, session: Session) -> tuple[tuple[str, str], ...]:
@@ -121,7 +122,7 @@ class CheckUnit(SceneUnit):
         reference = REFERENCE_KIND.read(Path(self.protocol.reference))
         rules = self.protocol.rules or CalibrationRules()
         change = picture_change(frames, picture_of(reference, self.protocol.reference))
-        return tuple(broken_rules(change, rules))
+        return tuple((rule, str(warning)) for rule, warning in broken_rules(change, rules))
 
 
 def picture_of(reference: ReferenceFile, path: str) -> CardPicture:
@@ -157,39 +158,57 @@ def picture_change(frames: Sequence[FrameRecord], before: CardPicture) -> Pictur
     )
 
 
-def broken_rules(change: PictureChange, rules: CalibrationRules) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each rule that the change breaks.
+def broken_rules(
+    change: PictureChange, rules: CalibrationRules
+) -> Iterator[tuple[str, ResultWarning]]:
+    """Yield the name of each rule that the change breaks, and its warning.
 
     A filter that has moved changes all the rest, which then says nothing.
     """
     if _is_beyond(change.shift_nm, 0.0, rules.shift_nm):
         yield (
             "shift_nm",
-            f"the variable filter is {change.shift_nm.value:+.1f} nm from its place before the "
-            "camera, or the camera was moved",
+            Disturbance(
+                "filter-moved",
+                "the variable filter is {shift_nm:+.1f} nm from its place before the camera, or "
+                "the camera was moved",
+                shift_nm=change.shift_nm.value,
+            ),
         )
         return
     if _is_beyond(change.brightness, 1.0, rules.brightness):
         yield (
             "brightness",
-            f"the card through the filter is {change.brightness.value:.2f} times as bright as when "
-            "it was calibrated: the lamp aged or was moved, or this is another card",
+            Disturbance(
+                "card-brightness-changed",
+                "the card through the filter is {ratio:.2f} times as bright as when it was "
+                "calibrated: the lamp aged or was moved, or this is another card",
+                ratio=change.brightness.value,
+            ),
         )
     if _is_beyond(change.colour, 1.0, rules.colour):
-        colour = "redder" if change.colour.value < 1 else "bluer"
         yield (
             "colour",
-            f"the lamp is {colour} than when it was calibrated, by "
-            f"{100 * abs(change.colour.value - 1):.1f} % between 420 nm and 680 nm: it aged, or "
-            "its voltage changed",
+            Disturbance(
+                "lamp-colour-changed",
+                "the lamp is {colour} than when it was calibrated, by {change_percent:.1f} % "
+                "between 420 nm and 680 nm: it aged, or its voltage changed",
+                colour="redder" if change.colour.value < 1 else "bluer",
+                change_percent=100 * abs(change.colour.value - 1),
+            ),
         )
     worst, worst_nm = change.worst
     if abs(worst) > rules.unevenness:
         yield (
             "unevenness",
-            f"the card through the filter is off by {100 * worst:+.1f} % at {worst_nm:.0f} nm "
-            "against other wavelengths: this is another card or another filter, or there is dirt "
-            "on it",
+            Disturbance(
+                "card-spectrum-changed",
+                "the card through the filter is off by {deviation_percent:+.1f} % at "
+                "{wavelength_nm:.0f} nm against other wavelengths: this is another card or another "
+                "filter, or there is dirt on it",
+                deviation_percent=100 * worst,
+                wavelength_nm=worst_nm,
+            ),
         )
 
 

@@ -24,6 +24,7 @@ from labrig.fit.camera_curves import (
     fit_camera_curves,
 )
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning, Undetermined
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.optics import (
     CHANNELS,
@@ -164,27 +165,35 @@ def _mean_sigma(camera: CameraResponse) -> float:
     return float(np.sqrt(np.mean(np.square(relative))))
 
 
-def _warnings(fit: CameraCurvesFit, scene: ChartScene, filtered: bool) -> Iterator[str]:
+def _warnings(fit: CameraCurvesFit, scene: ChartScene, filtered: bool) -> Iterator[ResultWarning]:
     if fit.misfit > ODD_CHART:
         pulls = np.abs(scene.value - fit.chart) / fit.chart_sigma
         worst = CHART_PATCHES[int(pulls.max(axis=1).argmax())]
-        yield (
-            f"the patches differ {fit.misfit:.1f} times as much from what a camera would see as "
-            "charts do from their published means: the chart is another one, faded, shiny or in "
-            "glare (name a table of your own chart as 'chart:'); σ was raised by as much, and the "
-            f"patch that is off most, {worst}, is off by {pulls.max():.1f} of it"
+        yield Contradiction(
+            "chart-unusual",
+            "the patches differ {misfit:.1f} times as much from what a camera would see as charts "
+            "do from their published means: the chart is another one, faded, shiny or in glare "
+            "(name a table of your own chart as 'chart:'); σ was raised by as much, and the patch "
+            "that is off most, {worst}, is off by {most_sigmas:.1f} of it",
+            misfit=fit.misfit,
+            worst=worst,
+            most_sigmas=pulls.max(),
         )
     if fit.unusualness > (ODD_BY_FILTER if filtered else ODD_CAMERA):
-        yield (
-            f"the camera is {fit.unusualness:.1f} times as far from the mean of the shipped ones "
-            "as these are: the lamp is not the one of the rig file (its spectrum enters the curves "
-            "one to one), or the camera is of another kind, such as an old or a scientific one"
+        yield Contradiction(
+            "camera-unusual",
+            "the camera is {unusualness:.1f} times as far from the mean of the shipped ones as "
+            "these are: the lamp is not the one of the rig file (its spectrum enters the curves "
+            "one to one), or the camera is of another kind, such as an old or a scientific one",
+            unusualness=fit.unusualness,
         )
     if scene.range is not None and scene.range < UNEVEN:
-        yield (
-            f"the lamp shines unevenly on the chart (darkest place {scene.range:.0%} of the "
-            "brightest); glare and shadows may be left when the card has corrected that: move the "
-            "lamp away or the chart to the middle"
+        yield Disturbance(
+            "chart-uneven",
+            "the lamp shines unevenly on the chart (darkest place {darkest:.0%} of the brightest); "
+            "glare and shadows may be left when the card has corrected that: move the lamp away or "
+            "the chart to the middle",
+            darkest=scene.range,
         )
     if _mean_sigma(fit.camera) > POOR:
         more = (
@@ -192,4 +201,9 @@ def _warnings(fit: CameraCurvesFit, scene: ChartScene, filtered: bool) -> Iterat
             if filtered
             else "photograph the card through the variable filter, too ('through: true')"
         )
-        yield f"the curves are uncertain by {_mean_sigma(fit.camera):.1%} of their peaks; {more}"
+        yield Undetermined(
+            "curves-uncertain",
+            "the curves are uncertain by {sigma:.1%} of their peaks; {remedy}",
+            sigma=_mean_sigma(fit.camera),
+            remedy=more,
+        )

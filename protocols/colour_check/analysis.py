@@ -27,6 +27,7 @@ from labrig.calibration import CAMERA_KIND, LVF_KIND
 from labrig.fit.camera_curves import ADDED, COURSE, COURSE_NM, LEVEL
 from labrig.fit.spectrum import CurveError, fit_spectrum, smooth_modes
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.result_warning import Contradiction, Disturbance, Misfit, ResultWarning
 from labrig.optics import (
     CHART_PATCHES,
     CIE_1931,
@@ -443,42 +444,61 @@ def analyse(context: AnalysisContext) -> ColourCheckResult:
 
 def _plain_warnings(
     summary: ColourSummary, plain: PlainColours, channels: tuple[str, ...]
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     if summary.verdict == "differs":
-        yield (
-            f"plainly: ΔE2000 is {summary.mean:.1f} on average, {summary.allowed:.1f} is what "
-            f"errors allow (most {summary.worst}, {summary.largest:.1f}); the camera's curves are "
-            "those of another camera, or the chart is another one, faded or in glare"
+        yield Contradiction(
+            "colours-differ",
+            "ΔE2000 is {mean:.1f} on average, {allowed:.1f} is what errors allow (most {worst}, "
+            "{largest:.1f}); the camera's curves are those of another camera, or the chart is "
+            "another one, faded or in glare",
+            subject="plainly",
+            mean=summary.mean,
+            allowed=summary.allowed,
+            worst=summary.worst,
+            largest=summary.largest,
         )
     pulls = (plain.balance - 1) / plain.balance_sigma
     worst = int(np.abs(pulls).argmax())
     if abs(pulls[worst]) > ODD_BALANCE:
-        yield (
-            f"the grey card is {plain.balance[worst] - 1:+.0%} off in {channels[worst]}, "
-            f"{abs(pulls[worst]):.1f} σ; the lamp's spectrum or the camera's curves are not those "
-            "of the rig file"
+        yield Contradiction(
+            "card-colour-differs",
+            "the grey card is {deviation:+.0%} off in {channel}, {sigmas:.1f} σ; the lamp's "
+            "spectrum or the camera's curves are not those of the rig file",
+            deviation=plain.balance[worst] - 1,
+            channel=channels[worst],
+            sigmas=abs(pulls[worst]),
         )
 
 
 def _through_warnings(
     summary: ColourSummary | None, through: ThroughColours | None
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     if summary is None or through is None:
         return
     if summary.verdict == "differs":
-        yield (
-            f"through the filter: ΔE2000 is {summary.mean:.1f} on average, {summary.allowed:.1f} "
-            f"is what errors allow (most {summary.worst}, {summary.largest:.1f}); a patch did not "
-            "fill the strip, or the filter is not as it was calibrated: run lvf_calibration again"
+        yield Contradiction(
+            "colours-differ",
+            "ΔE2000 is {mean:.1f} on average, {allowed:.1f} is what errors allow (most {worst}, "
+            "{largest:.1f}); a patch did not fill the strip, or the filter is not as it was "
+            "calibrated: run lvf_calibration again",
+            subject="through the filter",
+            mean=summary.mean,
+            allowed=summary.allowed,
+            worst=summary.worst,
+            largest=summary.largest,
         )
     if abs(through.shift_nm) > MOVED_NM:
-        yield (
-            f"the filter's strip lies {through.shift_nm:+.1f} nm along itself from where it was "
-            "calibrated: it was moved, or the camera was; put it back, or run lvf_calibration again"
+        yield Disturbance(
+            "strip-shifted",
+            "the filter's strip lies {shift_nm:+.1f} nm along itself from where it was calibrated: "
+            "it was moved, or the camera was; put it back, or run lvf_calibration again",
+            shift_nm=through.shift_nm,
         )
     if through.misfit > ODD_MISFIT:
-        yield (
-            f"the grey card through the filter differs {through.misfit:.1f} times as much as "
-            "errors allow from what lamp, filter and camera make of it; the lamp or the camera's "
-            "curves are not those of the rig file, or the filter is not as it was calibrated"
+        yield Misfit(
+            "card-through-filter",
+            "the grey card through the filter differs {misfit:.1f} times as much as errors allow "
+            "from what lamp, filter and camera make of it; the lamp or the camera's curves are not "
+            "those of the rig file, or the filter is not as it was calibrated",
+            misfit=through.misfit,
         )

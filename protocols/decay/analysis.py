@@ -23,6 +23,7 @@ from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Undetermined
 from labrig.material import Material, Provenance, State
 from labrig.protocols.decay.options import DecayOptions
 from labrig.protocols.decay.result import DecayResult
@@ -264,21 +265,30 @@ def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:
+def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[ResultWarning]:
     for name, patch_series in series.items():
         clipped = sum("clipped" in flag for flag in patch_series.flag)
         if clipped:
-            yield (
-                f"{_prefix(name, series)}{clipped} of {len(patch_series.flag)} frames are clipped "
-                "and left out; expose for less or lower the ISO"
+            yield Disturbance(
+                "frames-clipped",
+                "{clipped} of {frames} frames are clipped and left out; expose for less or lower "
+                "the ISO",
+                subject=_subject(name, series),
+                clipped=clipped,
+                frames=len(patch_series.flag),
             )
 
 
-def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
+def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[ResultWarning]:
     """Iterate over the warnings of fits, with the names of patches where there are several."""
     for name, fit in fits.items():
-        lines = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
-        yield from (f"{_prefix(name, fits)}{text}" for text in lines)
+        subject = _subject(name, fits)
+        if isinstance(fit, str):
+            yield Undetermined(
+                "patch-unfitted", "not fitted: {reason}", subject=subject, reason=fit
+            )
+        else:
+            yield from (warning.about(subject) for warning in fit.warnings)
 
 
 def _rates(fits: Mapping[str, DecayFit | str]) -> list[Measured]:
@@ -286,5 +296,6 @@ def _rates(fits: Mapping[str, DecayFit | str]) -> list[Measured]:
     return [rate for fit in fits.values() if not isinstance(fit, str) for rate in fit.rates]
 
 
-def _prefix(name: str, patches: Mapping[str, object]) -> str:
-    return f"{name}: " if len(patches) > 1 else ""
+def _subject(name: str, patches: Mapping[str, object]) -> str:
+    """Return a patch's name, empty for the only patch."""
+    return name if len(patches) > 1 else ""

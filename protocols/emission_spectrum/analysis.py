@@ -49,6 +49,13 @@ from labrig.fit.spectrum import (
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    ResultWarning,
+    Undetermined,
+    Unmeasured,
+)
 from labrig.optics import Spectrum, Transmittance, hat_functions, quadrature
 from labrig.protocols.emission_spectrum.protocol import (
     AFTERWARDS,
@@ -275,12 +282,17 @@ def with_repeats(model: ForwardModel, sigma: float) -> ForwardModel:
     return replace(model, system=replace(system, modes=np.concatenate([system.modes, modes])))
 
 
-def repeat_warnings(glows: Mapping[str, GlowThroughFilters]) -> list[str]:
-    """Return a line for each lamp after whose charges the glow changed much."""
+def repeat_warnings(glows: Mapping[str, GlowThroughFilters]) -> list[ResultWarning]:
+    """Return a warning of each lamp after whose charges the glow changed much."""
     return [
-        f"after the last charge by the {lamp} lamp the sample glowed {100 * glow.change:+.0f} % as "
-        "compared with the first: filters are compared by a brightness between; charge for longer, "
-        "or let the sample rest until it is dark"
+        Disturbance(
+            "glow-not-repeated",
+            "after the last charge by the {lamp} lamp the sample glowed {change_percent:+.0f} % as "
+            "compared with the first: filters are compared by a brightness between; charge for "
+            "longer, or let the sample rest until it is dark",
+            lamp=lamp,
+            change_percent=100 * glow.change,
+        )
         for lamp, glow in glows.items()
         if abs(glow.change) > NOTABLE
     ]
@@ -388,8 +400,8 @@ def analyse(context: AnalysisContext) -> EmissionSpectrumResult:
 
 def _models(
     context: AnalysisContext, frame: SeriesFrame
-) -> tuple[Mapping[StripPatch, ForwardModel], tuple[str, ...]]:
-    """Return the model of every patch, and the reasons for patches without one."""
+) -> tuple[Mapping[StripPatch, ForwardModel], tuple[ResultWarning, ...]]:
+    """Return the model of every patch, and warnings of patches without one."""
     if context.protocol.select is not None:
         return filter_models(context, context.protocol.select, frame), ()
     return forward_models(context, frame)
@@ -403,7 +415,7 @@ def _patch_spectrum(
     frames: Sequence[SeriesFrame],
     *,
     white: bool,
-) -> tuple[PatchSpectrum, list[str]]:
+) -> tuple[PatchSpectrum, list[ResultWarning]]:
     """Return the patch's spectrum, and warnings."""
     select = context.protocol.select
     charging_lamps = list(dict.fromkeys(lamp_of(frame.unit) for frame in frames))
@@ -488,7 +500,7 @@ def _card(reduction: PatchReduction, select: CameraFilters | None) -> FilterFram
     return white_through_filters(reduction, select)
 
 
-def _charges(glows: Mapping[str, FilterFrames]) -> tuple[list[_Charge], list[str]]:
+def _charges(glows: Mapping[str, FilterFrames]) -> tuple[list[_Charge], list[ResultWarning]]:
     """Return the charges after which something glows, and a warning for each of the others.
 
     Raises
@@ -497,72 +509,93 @@ def _charges(glows: Mapping[str, FilterFrames]) -> tuple[list[_Charge], list[str
         Nothing glows after the first charge.
     """
     charges: list[_Charge] = []
-    dead: list[str] = []
+    dead: list[ResultWarning] = []
     for lamp, frames in glows.items():
         try:
             visible_frames = visible(frames)
         except DataError:
             if not charges:
                 raise
-            dead.append(f"after charging with the {lamp} lamp nothing glows: it did not light")
+            dead.append(
+                Unmeasured(
+                    "lamp-unlit",
+                    "after charging with the {lamp} lamp nothing glows: it did not light",
+                    lamp=lamp,
+                )
+            )
             continue
         charges.append(_Charge(lamp, visible_frames, combined(visible_frames)))
     return charges, dead
 
 
-def _difference_warnings(spectrum: PatchSpectrum) -> Iterator[str]:
+def _difference_warnings(spectrum: PatchSpectrum) -> Iterator[ResultWarning]:
     if spectrum.changes_with_time:
         worst = max(spectrum.times, key=lambda comparison: comparison.beyond_noise)
-        yield (
-            f"the spectrum changes with time: at {worst.what} it differs by "
-            f"{worst.beyond_noise:.1%} (rms, beyond noise) from the other times; states emit in "
-            "different colours, or another light comes in, so that one Λ* does not describe them"
+        yield Contradiction(
+            "spectrum-changes",
+            "the spectrum changes with time: at {time} it differs by {difference:.1%} (rms, beyond "
+            "noise) from the other times; states emit in different colours, or another light comes "
+            "in, so that one Λ* does not describe them",
+            time=worst.what,
+            difference=worst.beyond_noise,
         )
     if spectrum.depends_on_lamp:
         worst = max(spectrum.lamps, key=lambda comparison: comparison.beyond_noise)
-        yield (
-            f"the spectrum depends on the lamp: {worst.what} it differs by "
-            f"{worst.beyond_noise:.1%} (rms, beyond noise); is it the same sample, in its place?"
+        yield Contradiction(
+            "spectrum-depends-on-lamp",
+            "the spectrum depends on the lamp: {lamps} it differs by {difference:.1%} (rms, beyond "
+            "noise); is it the same sample, in its place?",
+            lamps=worst.what,
+            difference=worst.beyond_noise,
         )
 
 
-def _line_warnings(fit: SpectrumFit) -> Iterator[str]:
+def _line_warnings(fit: SpectrumFit) -> Iterator[ResultWarning]:
     if fit.lines_nm:
-        places = ", ".join(f"{low:.0f} to {high:.0f}" for low, high in fit.lines_nm)
-        yield (
-            f"light in lines much narrower than the filter's band, at {places} nm: how much light "
-            "is near each of them is measured, how it is divided between neighbouring wavelengths "
-            "is not, and σ is large there; if the shape matters, use a spectrometer"
+        yield Undetermined(
+            "narrow-lines",
+            "light in lines much narrower than the filter's band, at {places_nm} nm: how much "
+            "light is near each of them is measured, how it is divided between neighbouring "
+            "wavelengths is not, and σ is large there; if the shape matters, use a spectrometer",
+            places_nm=tuple(f"{low:.0f} to {high:.0f}" for low, high in fit.lines_nm),
         )
 
 
-def _uncharged_warnings(charges: Sequence[_Charge]) -> Iterator[str]:
+def _uncharged_warnings(charges: Sequence[_Charge]) -> Iterator[ResultWarning]:
     """Warn of lamps after which the glow continued to fade as if they had not been lit."""
     for before, after in pairwise(charges):
         is_finite = np.isfinite(before.combined.value) & np.isfinite(after.combined.value)
         remaining_glow = before.combined.value[is_finite] * before.combined.brightness[-1]
         new_glow = after.combined.value[is_finite]
         if float(new_glow @ remaining_glow) < CHARGED_ANEW * float(remaining_glow @ remaining_glow):
-            yield (
-                f"after charging with the {after.lamp} lamp the glow is no brighter than what was "
-                f"left before: the {after.lamp} lamp did not light, or hardly excites this sample"
+            yield Unmeasured(
+                "lamp-excites-nothing",
+                "after charging with the {lamp} lamp the glow is no brighter than what was left "
+                "before: the {lamp} lamp did not light, or hardly excites this sample",
+                lamp=after.lamp,
             )
 
 
-def _faint_warnings(count: int, frames: Sequence[SeriesFrame]) -> Iterator[str]:
+def _faint_warnings(count: int, frames: Sequence[SeriesFrame]) -> Iterator[ResultWarning]:
     usable = sum(frame.unit == frames[0].unit and is_usable(frame.flag) for frame in frames)
     if count != usable:
-        yield (
-            f"{usable - count} of {usable} frames show no light above the noise and are left out; "
-            "photograph earlier (times:), or charge for longer"
+        yield Undetermined(
+            "frames-faint",
+            "{faint} of {frames} frames show no light above the noise and are left out; photograph "
+            "earlier (times:), or charge for longer",
+            faint=usable - count,
+            frames=usable,
         )
 
 
-def _clipping_warnings(frames: FilterFrames) -> Iterator[str]:
+def _clipping_warnings(frames: FilterFrames) -> Iterator[ResultWarning]:
     clipped = np.isnan(frames.value_dn_per_s)
     if clipped.any():
-        clipped_everywhere = int(clipped.all(axis=0).sum())
-        yield (
-            f"{clipped.mean():.0%} of the values clip and are left out, {clipped_everywhere} of "
-            f"{clipped.shape[1]} in every frame; expose for less or lower the ISO"
+        yield Disturbance(
+            "values-clipped",
+            "{clipped:.0%} of the values clip and are left out, {clipped_everywhere} of {places} "
+            "in every frame; expose for less or lower the ISO",
+            clipped=clipped.mean(),
+            clipped_everywhere=int(clipped.all(axis=0).sum()),
+            places=clipped.shape[1],
         )

@@ -245,7 +245,7 @@ class ExcitationResult(RunResult):
             "covariance": fit.covariance.tolist(),
             "intervals": {name: each.to_dict() for name, each in fit.intervals.items()},
             "models": [vars(model) for model in fit.models],
-            "warnings": list(fit.warnings),
+            "warnings": [each.to_dict() for each in fit.warnings],
         }
 
 

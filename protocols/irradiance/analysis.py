@@ -15,6 +15,7 @@ from labrig.calibration import CAMERA_KIND, LVF_KIND, CardLight, IrradianceFile
 from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Undetermined
 from labrig.optics import (
     CameraResponse,
     Lvf,
@@ -127,18 +128,20 @@ def _of_lights(context: AnalysisContext, select: ExcitingLights) -> IrradianceRe
     )
 
 
-def _hardly_known(names: Sequence[str], scale: StripScale) -> Iterator[str]:
-    """Yield a line if the camera alone tells too little of some lights."""
+def _hardly_known(names: Sequence[str], scale: StripScale) -> Iterator[ResultWarning]:
+    """Yield a warning if the camera alone determines some lights badly."""
     unknown = [
         f"{name} to {100 * sigma:.0f} %"
         for name, sigma in zip(names, scale.relative_sigma, strict=True)
         if sigma > HARDLY_KNOWN
     ]
     if unknown:
-        yield (
-            f"the irradiance of some lights is hardly known ({', '.join(unknown)}), nor are the "
-            "excitation rates of their bands: let a spectrometer read the card, too "
-            "('spectrometer' under 'devices'), or measure the camera's curves (camera_curves)"
+        yield Undetermined(
+            "irradiance-uncertain",
+            "the camera's curves determine the irradiance of some lights badly ({lights}), and so "
+            "the excitation rates of their bands: let a spectrometer read the card, too "
+            "('spectrometer' under 'devices'), or measure the camera's curves (camera_curves)",
+            lights=tuple(unknown),
         )
 
 
@@ -332,11 +335,13 @@ def _direct_sigma(lamp: Spectrum, edges: FloatArray, norm: float) -> FloatArray:
     return norm * band_integrals(lamp.wavelength_nm, lamp.sigma, edges)
 
 
-def _warnings(card: CardRatio) -> Iterator[str]:
+def _warnings(card: CardRatio) -> Iterator[ResultWarning]:
     if card.drift > DRIFT:
-        yield (
-            f"the lamp changed by {card.drift:.1%} from round to round; let it warm up for longer, "
-            "or look for something that was moved"
+        yield Disturbance(
+            "lamp-drifts",
+            "the lamp changed by {drift:.1%} from round to round; let it warm up for longer, or "
+            "look for something that was moved",
+            drift=card.drift,
         )
 
 

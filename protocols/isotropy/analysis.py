@@ -15,7 +15,7 @@ from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.calibration import BLANK_KIND, CAMERA_KIND
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
-from labrig.foundation.number_format import plus_minus
+from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning
 from labrig.protocols.isotropy.result import (
     PAPER_FLUCTUATION,
     AngularGlow,
@@ -57,9 +57,9 @@ def analyse(context: AnalysisContext) -> IsotropyResult:
             *timing_warnings(run, protocol.role),
             *stray,
             *(
-                f"{name}: {line}" if len(patches) > 1 else line
+                warning.about(name if len(patches) > 1 else "")
                 for name, glow in patches.items()
-                for line in (*series[name].warnings, *_warnings(glow))
+                for warning in (*series[name].warnings, *_warnings(glow))
             ),
         ),
     )
@@ -139,17 +139,22 @@ def _interpolate_log(at_s: FloatArray, t_s: FloatArray, log_value: FloatArray) -
     return np.where(is_beyond, start + slope * np.log(at_s), interpolated)
 
 
-def _warnings(glow: AngularGlow) -> Iterator[str]:
+def _warnings(glow: AngularGlow) -> Iterator[ResultWarning]:
     if not is_within_paper(glow.worst):
-        yield (
-            f"the emission is not isotropic: at {glow.worst_angle_deg}° it is "
-            f"{plus_minus(glow.worst.value, glow.worst.sigma)} of the straight view (the paper's "
-            f"samples stay within {PAPER_FLUCTUATION:.0%}); the model takes it for the same in all "
-            "directions. Does the patch still lie inside of the turned sample?"
+        yield Contradiction(
+            "emission-anisotropic",
+            "the emission is not isotropic: at {angle_deg}° it is {ratio.plus_minus} of the "
+            "straight view (the paper's samples stay within {usual:.0%}); the model takes it for "
+            "the same in all directions. Does the patch still lie inside of the turned sample?",
+            angle_deg=glow.worst_angle_deg,
+            ratio=glow.worst,
+            usual=PAPER_FLUCTUATION,
         )
     if not is_within_paper(glow.drift):
-        yield (
+        yield Disturbance(
+            "glow-drifts",
             "between the straight views before and after the others the glow changed to "
-            f"{plus_minus(glow.drift.value, glow.drift.sigma)} of what it was; the drift is taken "
-            "for even in time: was lamp, sample or camera moved?"
+            "{ratio.plus_minus} of what it was; the drift is taken for even in time: was lamp, "
+            "sample or camera moved?",
+            ratio=glow.drift,
         )

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,44 +10,6 @@ from labrig.foundation.arrays import FloatArray
 from labrig.results.budget import Budget
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
-
-
-class LedFault(StrEnum):
-    """Faults of an LED, or of what it lights."""
-
-    NOT_MEASURED = "not measured"
-    NOT_LIT = "not lit"
-    NOT_SEEN = "not seen"
-    TWO_LIT = "two lit"
-    OTHER_LED = "other LED"
-    OTHER_WAVELENGTH = "other wavelength"
-    CLIPPED = "clipped"
-    SATURATED = "saturated"
-    AMBIENT_LIGHT = "ambient light"
-    FLUORESCENT_REFERENCE = "fluorescent reference"
-    CAMERA_DISAGREES = "camera disagrees"
-    UNSEEN_CHANNEL = "unseen channel"
-    UNKNOWN_BRIGHTNESS = "unknown brightness"
-    DRIFT = "drift"
-
-
-@dataclass(frozen=True)
-class LedFinding:
-    """Something amiss.
-
-    Attributes
-    ----------
-    fault
-        What it is.
-    leds
-        LEDs that it concerns.
-    text
-        Line for people: what was found, and what to do.
-    """
-
-    fault: LedFault
-    leds: tuple[str, ...]
-    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +65,6 @@ class LedBrightnessResult(RunResult):
     drift
         Relative change of the first LED from the begin to the end of the run; null if it was not
         lit twice.
-    findings
-        What was found amiss; their texts are among the warnings.
 
     Examples
     --------
@@ -120,7 +79,6 @@ class LedBrightnessResult(RunResult):
     channels: tuple[str, ...]
     leds: Mapping[str, LedMeasured]
     drift: Measured | None
-    findings: tuple[LedFinding, ...]
 
     def budgets(self) -> dict[str, Budget]:
         """Return the budgets of the brightness of every LED, whose σ has card and curves in it."""

@@ -47,7 +47,7 @@ def _lines(result: LuminanceResult) -> Iterator[str]:
     for name, patch in result.patches.items():
         if len(result.patches) > 1:
             yield f"{name}:"
-        yield from str(patch.decay).splitlines()
+        yield from patch.decay.table().splitlines()
     if len(result.patches) > 1:
         yield f"by luminance at 10 min: {', '.join(result.ranked())}"
 

@@ -26,6 +26,7 @@ from labrig.fit.spectrum import CurveError
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares
+from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning
 from labrig.optics import (
     CameraResponse,
     Lvf,
@@ -182,16 +183,20 @@ def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> l
     return filter_misfits
 
 
-def left_out_text(misfit: FilterMisfit) -> str:
+def left_out_warning(misfit: FilterMisfit) -> ResultWarning:
     """Return a warning about a filter that was not in its place."""
     likeness = "it looks like none of the others"
     if misfit.like != misfit.name and misfit.own > BETTER * misfit.best:
         best_name = "no filter" if misfit.like == NO_FILTER.name else misfit.like
         likeness = f"it looks like {best_name} ({misfit.best:.3f})"
-    return (
-        f"colour filter {misfit.name}: its picture is off its transmittance by {misfit.own:.3f} "
-        f"(rms along the strip), {likeness}; it was not in its place, and is left out (put it in "
-        "and take its unit again, or correct its file)"
+    return Contradiction(
+        "filter-misplaced",
+        "its picture is off its transmittance by {rms:.3f} (rms along the strip), {likeness}; it "
+        "was not in its place, and is left out (put it in and take its unit again, or correct its "
+        "file)",
+        subject=f"colour filter {misfit.name}",
+        rms=misfit.own,
+        likeness=likeness,
     )
 
 
@@ -496,18 +501,24 @@ def _stripes(
 
 def _warnings(
     filter_misfits: tuple[FilterMisfit, ...], misfit: FloatArray, stripes: Stripes | None
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     yield from (
-        left_out_text(filter_misfit) for filter_misfit in filter_misfits if filter_misfit.left_out
+        left_out_warning(filter_misfit)
+        for filter_misfit in filter_misfits
+        if filter_misfit.left_out
     )
     if np.median(misfit) > BAD_MISFIT:
-        yield (
-            f"the filters contradict one another (misfit {np.median(misfit):.1f}, 1 is "
-            "expected): check the curves of lamp, camera and filters; σ was raised by as much"
+        yield Contradiction(
+            "filters-contradict",
+            "the filters contradict one another (misfit {misfit:.1f}, 1 is expected): check the "
+            "curves of lamp, camera and filters; σ was raised by as much",
+            misfit=np.median(misfit),
         )
     if stripes and abs(stripes.shift_nm) > SHIFTED_NM:
-        yield (
-            f"the sample is seen {stripes.shift_nm:+.1f} nm along the strip from where the "
-            "card was lit: the card lay higher, or the door does not open to the same place; the "
-            "map on the sample was shifted by that"
+        yield Disturbance(
+            "strip-shifted",
+            "the sample is seen {shift_nm:+.1f} nm along the strip from where the card was lit: "
+            "the card lay higher, or the door does not open to the same place; the map on the "
+            "sample was shifted by that",
+            shift_nm=stripes.shift_nm,
         )

@@ -34,6 +34,7 @@ from labrig.fit import EPSILON, LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.number_format import plus_minus
+from labrig.foundation.result_warning import Misfit, ResultWarning, Undetermined
 from labrig.material import DECAY_LAWS, exponential_means, exponential_means_and_slopes
 from labrig.protocols.saturation.options import SaturationOptions
 from labrig.protocols.saturation.protocol import Light, WeakerLight
@@ -364,9 +365,9 @@ def analyse(context: AnalysisContext) -> SaturationResult:
             *timing_warnings(run),
             *stray,
             *(
-                f"{name}: {line}" if len(patches) > 1 else line
+                warning.about(name if len(patches) > 1 else "")
                 for name, patch in patches.items()
-                for line in _warnings(patch)
+                for warning in _warnings(patch)
             ),
         ),
     )
@@ -446,42 +447,48 @@ def _growths(before: Curve, last: Curve) -> Iterator[Measured]:
         yield Measured(mean - 1, float(1 / np.sqrt(weight.sum())))
 
 
-def _warnings(patch: PatchSaturation) -> Iterator[str]:
+def _warnings(patch: PatchSaturation) -> Iterator[ResultWarning]:
     if patch.time_saturation == "not saturated":
-        yield (
+        yield Undetermined(
+            "not-saturated",
             "the glow still grows at the longest charge: charge for longer before decays whose "
-            "amplitudes are to be compared"
+            "amplitudes are to be compared",
         )
     if any(level.assessment == "no" for level in patch.levels):
-        levels = ", ".join(plus_minus(level.r, level.sigma) for level in patch.levels)
-        yield (
-            f"r(0) = 1 does not hold after the longest charge: r(0) = {levels}; Λ from the decay "
+        yield Misfit(
+            "charge-incomplete",
+            "r(0) = 1 does not hold after the longest charge: r(0) = {levels}; Λ from the decay "
             "alone would be too small by that factor, in each state by another: fit excitation "
-            "and decay jointly"
+            "and decay jointly",
+            levels=tuple(plus_minus(level.r, level.sigma) for level in patch.levels),
         )
     if patch.rates.differ:
-        yield (
-            f"the rates depend on the charge (p = {patch.rates.p_value:.2g}): the decay is no sum "
-            f"of {patch.fit.n_states} exponentials of fixed rates, as power laws are none; what "
-            "was found holds for the charge it was measured at"
+        yield Misfit(
+            "rates-depend-on-charge",
+            "the rates depend on the charge (p = {p_value:.2g}): the decay is no sum of {states} "
+            "exponentials of fixed rates, as power laws are none; the rates hold for the charge "
+            "they were measured at",
+            p_value=patch.rates.p_value,
+            states=patch.fit.n_states,
         )
     if patch.is_of_general_order:
         assert patch.order is not None
-        yield (
-            f"the glow falls as that of a state of kinetic order {patch.order.order}, the more "
-            "slowly the less it was charged: rates of exponentials hold for one charge only; "
-            "excitation finds the order, too"
+        yield Misfit(
+            "general-order",
+            "the glow falls as that of a state of kinetic order {order}, the more slowly the less "
+            "it was charged: rates of exponentials hold for one charge only; excitation determines "
+            "the order, too",
+            order=patch.order.order,
         )
     if patch.is_of_no_law:
         assert patch.order is not None
-        yield (
+        yield Misfit(
+            "no-kinetic-order",
             "neither first order nor a kinetic order describes how the glow falls after different "
-            f"charges (exponents {_known(patch.order.shift)} by the charge, "
-            f"{_known(patch.order.shape)} by the shape of the decays): rates hold for the charge "
-            "they were measured at; measure the decay after the charge that matters, and give "
-            "excitation two states of free order (--states 2 --order free)"
+            "charges (exponents {by_charge.plus_minus} by the charge, {by_shape.plus_minus} by the "
+            "shape of the decays): rates hold for the charge they were measured at; measure the "
+            "decay after the charge that matters, and give excitation two states of free order "
+            "(--states 2 --order free)",
+            by_charge=patch.order.shift,
+            by_shape=patch.order.shape,
         )
-
-
-def _known(found: Measured) -> str:
-    return plus_minus(found.value, found.sigma)

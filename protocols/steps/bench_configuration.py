@@ -176,9 +176,8 @@ def _arranged_before_resuming(session: Session) -> set[str]:
     """Return what was arranged before the devices were connected, if nothing was done since."""
     since = session.clock.wall(session.rig.connected_s)
     steps = session.actions(PERSON)
-    frames = [*session.frames(FrameRole.DARK), *session.frames(FrameRole.LOOK)]
-    times = [step.start_time for step in steps] + [frame.start_time for frame in frames]
-    if any(time >= since for time in times):
+    frame_times = [*session.frame_times(FrameRole.DARK), *session.frame_times(FrameRole.LOOK)]
+    if any(time >= since for time in [*frame_times, *(step.start_time for step in steps)]):
         return set()
     return {thing for step in steps if (thing := _component_of(step.task)) is not None}
 

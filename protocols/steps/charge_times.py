@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.fit import least_squares
 from labrig.foundation.arrays import FloatArray
 
 #: Number of a patch's places that decide: the brightest, where noise does not matter.
@@ -96,6 +95,8 @@ def _rate(charge_durations_s: FloatArray, glow: FloatArray) -> float:
         difference = np.log(-np.expm1(-s * charge_durations_s)) - np.log(glow)
         slope = _slopes(charge_durations_s, s)[:, 1:]
         return difference - difference.mean(), slope - slope.mean(axis=0)
+
+    from labrig.fit import least_squares  # plans and lists of runs need no SciPy
 
     low, high = np.log(0.01 / charge_durations_s.max()), np.log(10 / charge_durations_s.min())
     fit = least_squares(residuals, [(low + high) / 2], lower=low, upper=high, tolerance=1e-6)

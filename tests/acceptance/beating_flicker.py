@@ -23,6 +23,7 @@ from scipy.signal import square
 
 from labrig.fit import DecayFit, fit_decay
 from labrig.protocols.steps.random_spacing import RandomSpacing
+from tests.warned import codes
 
 FIRST_S, EVERY_S, FRAMES = 0.5, 5.0, 36
 #: Readout of the shipped camera, and the time that a protocol leaves for settings.
@@ -91,7 +92,7 @@ def line(n_states: int, fits: Sequence[DecayFit]) -> str:
     )  # fmt: skip
     wrong = (np.abs(pulls) > WRONG_SIGMAS).any(axis=1)
     warned = np.array([bool(fit.warnings) for fit in fits])
-    repeats = np.array(["residuals repeat" in " ".join(fit.warnings) for fit in fits])
+    repeats = np.array(["residuals-periodic" in codes(fit.warnings) for fit in fits])
     unseen = np.array([fit.unseen_flicker is not None for fit in fits])
     rms = np.sqrt((pulls**2).mean())
     shares = (wrong, wrong & ~warned & ~unseen, warned, repeats, unseen)

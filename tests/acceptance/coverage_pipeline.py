@@ -245,8 +245,13 @@ def report(scenario: Scenario, outcomes: Sequence[dict[str, Outcome]]) -> Iterat
                 f"warned {warned:.1f} %"
             )
         else:
-            said = [any(sample.replace("-", " ") in text for text in fit.warnings) for fit in fits]
-            yield f"{sample:21} flagged as such {sum(said)} of {len(outcomes)}"
+            law = sample.replace("-", " ")
+            flagged = sum(
+                warning.code == "rates-descriptive" and law in warning.values["law"]
+                for fit in fits
+                for warning in fit.warnings
+            )
+            yield f"{sample:21} flagged as such {flagged} of {len(outcomes)}"
 
 
 def main() -> None:

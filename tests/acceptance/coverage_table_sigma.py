@@ -29,6 +29,7 @@ from labrig.fit import fit_decay
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from tests.fit import truths
+from tests.warned import codes
 
 SPAN_S = 200.0
 #: Values below this fraction of the first do not count for σ: there a count or none is all noise.
@@ -150,13 +151,13 @@ class Broken:
     table
         Function of a seed's generator that returns times, values and σ.
     said
-        Text that a warning, or the line on σ, has to contain; empty if nothing has to.
+        Codes of warnings, or a text in the line on σ, any of which is expected; empty if none is.
     """
 
     name: str
     rates: tuple[float, ...]
     table: Callable[[np.random.Generator], Table]
-    said: str = ""
+    said: tuple[str, ...] = ()
 
 
 def drifting(rng: np.random.Generator, n: int, correlation: float) -> FloatArray:
@@ -187,7 +188,7 @@ def drift(
     name = (
         f"flicker, ρ = {correlation}, {number}, {n} values, {'σ of the rest' if given else 'no σ'}"
     )
-    return Broken(name, tuple(rate for rate, _ in states), table, "correlates")
+    return Broken(name, tuple(rate for rate, _ in states), table, ("noise-correlated",))
 
 
 def root_of_counts(brightest: float, decimals: int) -> Broken:
@@ -199,7 +200,7 @@ def root_of_counts(brightest: float, decimals: int) -> Broken:
         return t_s, counts, np.sqrt(np.maximum(counts, 1.0)).round(decimals)
 
     name = f"σ = √N, {brightest:g} counts, {decimals} decimals"
-    return Broken(name, (0.03,), table, "of the fitted curve")
+    return Broken(name, (0.03,), table, ("of the fitted curve",))
 
 
 def scaled(factor: float, kind: str) -> Broken:
@@ -211,7 +212,8 @@ def scaled(factor: float, kind: str) -> Broken:
         sigma = 0.01 * (np.ones_like(t_s) if kind == "constant" else np.sqrt(signal + 0.01))
         return t_s, signal + sigma * rng.normal(size=len(t_s)), factor * sigma
 
-    said = "" if factor == 1 else "scatter" if factor < 1 else "closer to the fit than σ"
+    too_small = ("sigma-rescaled", "scatter-exceeds-sigma")
+    said = () if factor == 1 else too_small if factor < 1 else ("sigma-too-large",)
     return Broken(f"σ times {factor:g}, {kind}", (0.1, 0.015), table, said)
 
 
@@ -224,7 +226,7 @@ def ceiling(level: float, states: tuple[tuple[float, float], ...]) -> Broken:
         return t_s, np.minimum(rng.poisson(signal), np.round(1e4 * level)).astype(np.float64), None
 
     name = f"ceiling at {100 * level:g} %, {len(states)} state(s)"
-    said = "saturated" if level < 1 else ""
+    said = ("detector-clipped", "first-values-low") if level < 1 else ()
     return Broken(name, tuple(rate for rate, _ in states), table, said)
 
 
@@ -275,9 +277,8 @@ def broken_pulls(case: Broken, seeds: range) -> tuple[FloatArray, float]:
             )
             (fitted,) = fit_table(path, TableFitOptions(states=len(case.rates)))
             fit = fitted.fit
-            said += case.said != "" and any(
-                case.said in text for text in (*fit.warnings, fit.sigma_origin)
-            )
+            given = (*codes(fit.warnings), fit.sigma_origin)
+            said += any(each in text for each in case.said for text in given)
             if fit.n_states == len(case.rates):
                 rates = zip(fit.states, case.rates, strict=True)
                 pulls.append([(state.k_r_per_s - k) / state.k_r_sigma_per_s for state, k in rates])

@@ -20,6 +20,7 @@ from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
 from tests.fit import truths
+from tests.warned import codes
 
 #: Frames every 1.5 s for a minute, then every 12 s: they resolve three states.
 DENSE_S = np.concatenate([0.3 + 1.5 * np.arange(40), 66.0 + 12.0 * np.arange(20)])
@@ -147,7 +148,7 @@ def laws_line(truth: Truth, fits: list[DecayFit]) -> str:
     """Return one line of the table of laws."""
     right = np.array([is_right(truth, each) for each in fits])
     silent = np.array([not each.warnings for each in fits]) & ~right
-    told = np.array([any("do not tell" in line for line in each.warnings) for each in fits])
+    told = np.array(["laws-tied" in codes(each.warnings) for each in fits])
     taken = Counter(
         f"{each.n_states} exp" if each.law == "exponentials" else each.law for each in fits
     )

@@ -41,6 +41,7 @@ from labrig.reduce import reduce_patches
 from labrig.results import FORECAST_SPANS, Series
 from tests.acceptance.decays_of_all_materials import shipped_rig
 from tests.fit import truths
+from tests.warned import codes
 
 #: Level of a fully charged sample.
 CHARGE = 0.5
@@ -306,7 +307,7 @@ def outcome(name: str, seed: int, sample: Sample, seen: Series) -> Outcome:
         seed=seed,
         law=f"{fit.n_states} exponentials" if fit.law == "exponentials" else fit.law,
         is_right=fit.law in sample.right and (states or not sample.rates_per_s),
-        is_tie_said=any("do not tell" in line for line in fit.warnings),
+        is_tie_said="laws-tied" in codes(fit.warnings),
         rate_pulls=[
             (state.k_r_per_s - k) / state.k_r_sigma_per_s
             for state, k in zip(fit.states, sample.rates_per_s, strict=False)
@@ -315,7 +316,7 @@ def outcome(name: str, seed: int, sample: Sample, seen: Series) -> Outcome:
         else [],
         signal_pulls=[] if sample.decay is None else signal_pulls(fit, sample.decay, seen),
         signal_to_noise=float(seen.values[0, brightest] / seen.sigma[0, brightest]),
-        warnings=list(fit.warnings),
+        warnings=codes(fit.warnings),
     )
 
 

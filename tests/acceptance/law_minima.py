@@ -29,6 +29,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS
 from tests.fit import truths
+from tests.warned import codes
 
 #: Differences of χ² that are counted.
 FAR, NEAR = 9.0, 1e-3
@@ -177,8 +178,8 @@ class Count:
         except FitError:
             return
         self.fits += 1
-        self.correlated += any("correlates" in line for line in fit.warnings)
-        self.unfinished += sum("not end at a minimum" in line for line in fit.warnings)
+        self.correlated += "noise-correlated" in codes(fit.warnings)
+        self.unfinished += codes(fit.warnings).count("law-unconverged")
         chi2 = {law.name: law.reduced_chi2 * table.dof(3) for law in fit.laws}
         for law in laws:
             if law not in chi2:

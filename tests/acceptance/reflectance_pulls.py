@@ -28,6 +28,7 @@ from labrig.sim.cards import GREY, GREY_NM
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
 from tests.analyse.recorded import part_of, record
 from tests.analyse.spectral_bench import true_lvf_file
+from tests.warned import codes
 
 WIDTH, HEIGHT = 384, 64
 NM = np.arange(400.0, 701.0, 10.0)
@@ -159,7 +160,7 @@ def judge(case: Case, seeds: Sequence[int]) -> str:
     return (
         f"{case.name:28} rms {np.sqrt(np.mean(each**2)):5.2f}  largest {np.abs(each).max():5.2f}  "
         f"off {max(off):.4f}  {max(relative):6.1%}  luminescence {mean_amount:6.2f} ± "
-        f"{mean_sigma:.2f}  warned {warned}/{len(seeds)}  {'; '.join(last)[:90]}"
+        f"{mean_sigma:.2f}  warned {warned}/{len(seeds)}  {', '.join(codes(last))}"
     )
 
 

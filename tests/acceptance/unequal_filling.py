@@ -29,12 +29,14 @@ import numpy as np
 import yaml
 
 from labrig.cli.exit_codes import guarded
+from labrig.foundation.result_warning import ResultWarning
 from labrig.process import process_run
 from labrig.protocols.saturation.result import PatchSaturation, SaturationResult
 from labrig.sim.lamp import BURNING_K, filament_spectrum
 from labrig.sim.phosphor import band_cells
 from tests.acceptance.decays_of_all_materials import shipped_rig
 from tests.acceptance.law_confusion import SPECTRUM, places
+from tests.warned import codes
 
 CHARGES = ("10 s", "1 min", "10 min")
 ORDERS, RETRAPPINGS, RATIOS = (1.5, 2.0, 3.0), (0.1, 0.5), (2.5, 5.0, 20.0)
@@ -49,11 +51,11 @@ BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
 EXCITED = (0.4, 1.0, 0.08, 0.0, 0.0, 0.0, 0.0, 0.0)
 SENSOR = {"width": 96, "height": 72}
 NO_ORDER = "no order"
-#: What is said, by the words of its warning, what claims most first.
-WORDS = {
-    "order": "as that of a state of kinetic order",
-    "rates": "the rates depend on the charge",
-    "no law": "neither first order nor a kinetic order",
+#: Claim of a sample's warnings by their codes, the largest claim first.
+CLAIMS = {
+    "order": "general-order",
+    "rates": "rates-depend-on-charge",
+    "no law": "no-kinetic-order",
 }
 
 
@@ -209,12 +211,10 @@ def saturation(made: dict[str, Sample], seed: int, folder: Path) -> SaturationRe
 
 
 def outcome(
-    name: str, seed: int, sample: Sample, patch: PatchSaturation, lines: list[str]
+    name: str, seed: int, sample: Sample, patch: PatchSaturation, warnings: list[ResultWarning]
 ) -> Outcome:
-    """Return what was said of a sample."""
-    said = next(
-        (what for what, words in WORDS.items() if any(words in line for line in lines)), NO_ORDER
-    )
+    """Return the claim of a sample's warnings."""
+    said = next((claim for claim, code in CLAIMS.items() if code in codes(warnings)), NO_ORDER)
     test = patch.order
     return Outcome(
         sample=name,
@@ -224,7 +224,7 @@ def outcome(
         verdict=test.verdict if test else "none",
         shift=test.shift.value if test else math.nan,
         shift_sigma=test.shift.sigma if test else math.nan,
-        warnings=lines,
+        warnings=codes(warnings),
     )
 
 
@@ -260,8 +260,11 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             result = saturation(made, seed, Path(folder))
         for number, (name, sample) in enumerate(made.items()):
-            prefix = f"{number}: "
-            own = [line.removeprefix(prefix) for line in result.warnings if line.startswith(prefix)]
+            own = [
+                warning
+                for warning in result.warnings
+                if warning.subject.split(": ")[0] == str(number)
+            ]
             outcomes.append(outcome(name, seed, sample, result.patches[str(number)], own))
             if asked.results is not None:
                 with asked.results.open("a", encoding="utf-8") as file:

@@ -43,6 +43,7 @@ from labrig.cli.exit_codes import guarded
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import LabrigError
 from labrig.foundation.region import region_pixels
+from labrig.foundation.result_warning import ResultWarning, as_warnings
 from labrig.process import process_run
 from labrig.protocols.decay.result import DecayResult
 from labrig.results import EXPONENTIALS, DecayPatch, DecayState, FittedDecay, RunResult
@@ -82,7 +83,7 @@ class Judged:
     percent
         Error of each result in % of the truth.
     warnings
-        What labrig said.
+        Warnings of the run and of its result.
     failure
         Why there is no result; empty if there is one.
     stated
@@ -94,7 +95,7 @@ class Judged:
     material: str
     pulls: dict[str, float]
     percent: dict[str, float]
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
     failure: str = ""
     stated: dict[str, float] = field(default_factory=dict)
 
@@ -199,7 +200,7 @@ def judge(case: AnyCase, seed: int, folder: Path) -> Judged:
     try:
         result = process_run(run)
     except LabrigError as error:
-        return Judged(*about, {}, {}, tuple(seen["warnings"]), str(error))
+        return Judged(*about, {}, {}, as_warnings(seen["warnings"]), str(error))
     errors = (
         dict(case.errors(result, truth))
         if isinstance(case, Charging)
@@ -208,7 +209,8 @@ def judge(case: AnyCase, seed: int, folder: Path) -> Judged:
     pulls = {name: off / sigma for name, (off, sigma, _) in errors.items()}
     percent = {name: 100 * off / true for name, (off, _, true) in errors.items()}
     stated = dict(_stated(case, result, truth)) if isinstance(case, Case) else {}
-    return Judged(*about, pulls, percent, (*seen["warnings"], *result.warnings), "", stated)
+    warnings = (*as_warnings(seen["warnings"]), *result.warnings)
+    return Judged(*about, pulls, percent, warnings, "", stated)
 
 
 def _stated(case: Case, result: RunResult, truth: Truth) -> Iterator[tuple[str, float]]:
@@ -306,7 +308,7 @@ def line(name: str, runs: Sequence[Judged]) -> str:
     done = [one for one in runs if one.pulls]
     furthest = [abs(one.pulls[one.furthest]) for one in done] or [np.nan]
     percent = [abs(one.percent[one.furthest]) for one in done] or [np.nan]
-    said = Counter(_kind(text) for one in runs for text in one.warnings)
+    said = Counter(_kind(warning) for one in runs for warning in one.warnings)
     failed = sum(bool(one.failure) for one in runs)
     return (
         f"{name:28}{len(runs):5}{sum(one.is_wrong for one in runs):6}"
@@ -323,9 +325,10 @@ HEAD = (
 )
 
 
-def _kind(warning: str) -> str:
-    """Return a warning without its numbers, cut off."""
-    return re.sub(r"[-+\d.,]+(e[-+]?\d+)?", "#", warning.partition(": ")[0])[:60]
+def _kind(warning: ResultWarning) -> str:
+    """Return the code of a warning; of a message of the run its text without numbers, cut off."""
+    text = re.sub(r"[-+\d.,]+(e[-+]?\d+)?", "#", warning.sentence.partition(": ")[0])
+    return warning.code or text[:60]
 
 
 def results(path: Path | None) -> list[Judged]:

@@ -2,7 +2,7 @@
 
 import pickle
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from hashlib import sha256
@@ -11,7 +11,7 @@ from typing import Any
 
 from filelock import FileLock
 
-from labrig.acquire import Plan, RunObserver
+from labrig.acquire import PlanClock, RunObserver
 from labrig.analyse import AnalysisContext, Inputs, Overrides
 from labrig.analyse.overrides import read_run_protocol
 from labrig.bench import Recording, Watch, resume_run
@@ -29,7 +29,7 @@ SHARED: Path | None = None
 
 
 @contextmanager
-def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+def quietly(plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
     yield Watching()
 
 

@@ -22,6 +22,7 @@ from tests.acceptance.coverage_table_sigma import (
     root_of_counts,
     scaled,
 )
+from tests.warned import of_code
 
 
 def fitted(folder: Path, *columns: np.ndarray, **options: object) -> DecayFit:
@@ -72,7 +73,7 @@ def test_values_at_a_ceiling_are_left_out_and_shown(tmp_path: Path) -> None:
     assert result.series.flag[:3] == ("clipped",) * 3
     assert result.series.flag[3:] == ("",) * 57
     report = report_table(table, [result], options, tmp_path / "out").report
-    assert "the detector was saturated" in report.read_text(encoding="utf-8")
+    assert "detector-clipped" in report.read_text(encoding="utf-8")
 
 
 def test_a_first_value_that_is_too_low_is_named_and_kept(tmp_path: Path) -> None:
@@ -80,9 +81,9 @@ def test_a_first_value_that_is_too_low_is_named_and_kept(tmp_path: Path) -> None
     values = np.exp(-0.03 * t_s) + 0.003 * np.random.default_rng(1).normal(size=60)
     values[0] = 0.94
     fit = fitted(tmp_path, t_s, values, states=1, origin="-10")
-    (warning,) = [text for text in fit.warnings if "law of the others" in text]
-    assert "at 0.5 s" in warning
-    assert "'--from 3.03" in warning
+    warned = of_code(fit.warnings, "first-values-low").values
+    assert (warned["values"], warned["until_s"]) == (1, 0.5)
+    assert warned["next_time"].startswith("3.03")
     assert len(fit.residuals) == 60
 
 

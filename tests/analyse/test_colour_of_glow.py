@@ -84,7 +84,9 @@ def test_with_exact_curves_the_luminance_is_exact() -> None:
     assert one.scale.doubt is None
     assert one.scale.card_doubt(one.card, 0.003) is None
     tinted = one.card * np.array([1.0, 1.0, 1.6])
-    assert "fluoresces" in (one.scale.card_doubt(tinted, 0.003) or "")
+    doubt = one.scale.card_doubt(tinted, 0.003)
+    assert doubt is not None
+    assert doubt.values["ratios"][2] > 1.4 * doubt.values["ratios"][1]
 
 
 def test_without_an_emission_green_is_told_well_and_blue_is_not() -> None:
@@ -94,7 +96,8 @@ def test_without_an_emission_green_is_told_well_and_blue_is_not() -> None:
     assert green.scale.doubt is None
     blue = found(470.0, 60.0, measured_curves(), known=False)
     assert abs(blue.pull) < 3
-    assert "leave" in (blue.scale.doubt or "")
+    assert blue.scale.doubt is not None
+    assert blue.scale.doubt.code == "luminance-by-channels"
 
 
 def test_an_emission_of_another_colour_is_noticed() -> None:
@@ -111,7 +114,8 @@ def test_an_emission_of_another_colour_is_noticed() -> None:
         card_reflectance(rig()),
         emission,
     )
-    assert "another colour than the emission of a file" in (wrong.doubt or "")
+    assert wrong.doubt is not None
+    assert wrong.doubt.values == {"emission": "a file"}
 
 
 @pytest.mark.campaign

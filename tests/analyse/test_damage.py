@@ -17,6 +17,7 @@ from labrig.foundation.errors import DataError, LabrigError
 from labrig.record import read_run
 from tests.conftest import Ended
 from tests.resealed import reseal
+from tests.warned import codes
 
 Labrig = Callable[..., Ended]
 RECORDED = Path(__file__).parent / "data" / "decay"
@@ -69,7 +70,8 @@ def test_a_report_does_without_a_damaged_photograph(run: Path) -> None:
     frames = intact_frames(read_run(run), Overrides())
     assert photograph.name not in [frame.path.name for frame in frames.daylight]
     assert len(frames.daylight) >= 3
-    assert frames.warnings[0].startswith(f"{photograph.name} was changed")
+    (warning,) = frames.warnings
+    assert (warning.code, warning.values["file"]) == ("photograph-damaged", photograph.name)
 
 
 def frames_of(run: Path, lines: list[str], end: str = "\n", sealed: bool = False) -> IntactFrames:
@@ -83,7 +85,7 @@ def frames_of(run: Path, lines: list[str], end: str = "\n", sealed: bool = False
 def test_a_torn_last_line_does_not_count_and_is_reported(run: Path) -> None:
     decay_only = LINES[: next(i for i, line in enumerate(LINES) if '"daylight"' in line)]
     assert len(frames_of(run, [*decay_only, LINES[0][:100]], end="").decay) == 12
-    assert "torn" in timing_warnings(read_run(run))[0]
+    assert codes(timing_warnings(read_run(run))) == ["journal-torn"]
 
 
 def test_lines_taken_out_or_doubled_are_noticed(run: Path) -> None:

@@ -27,6 +27,7 @@ from tests.analyse.direct_bench import (
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import DIRECT
 from tests.results.made import assert_read_back
+from tests.warned import codes, of_code
 
 pytest.importorskip("seabreeze")
 
@@ -184,20 +185,22 @@ def _checks(data: bytes) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("change", "said", "kept"),
+    ("change", "subject", "code", "kept"),
     [
-        ({"white: 430 nm": (0.0, {})}, "430 nm: gave no light on the white reference", 2),
+        ({"white: 430 nm": (0.0, {})}, "430 nm", "light-unlit", 2),
         (
             {"white: 430 nm": (1.0, {"white: 490 nm": 0.3})},
-            "430 nm: the white reference shows peaks at 43",
+            "430 nm",
+            "two-lights",
             2,
         ),
-        ({"white: 365 nm": (1.0, {"white: 490 nm": 0.3})}, "365 nm: with it shines 490 nm", 2),
-        ({"white: 430 nm": (1000.0, {})}, "white under 430 nm: pixels are saturated", 2),
-        ({"yellow-textile: 430 nm": (0.0, {})}, "no light came back under 430 nm", 2),
+        ({"white: 365 nm": (1.0, {"white: 490 nm": 0.3})}, "365 nm", "two-lights", 2),
+        ({"white: 430 nm": (1000.0, {})}, "white under 430 nm", "spectrometer-saturated", 2),
+        ({"yellow-textile: 430 nm": (0.0, {})}, "yellow-textile", "no-light-back", 2),
         (
             {"yellow-textile: 490 nm": (1.0, {"white: 430 nm": 0.3})},
-            "under 490 nm light came back at 4",
+            "yellow-textile",
+            "stray-light",
             2,
         ),
         (
@@ -205,16 +208,17 @@ def _checks(data: bytes) -> dict[str, Any]:
                 f"{stage}: 430 nm": (0.0, {f"{stage}: 490 nm": 1.0})
                 for stage in ("white", "yellow-textile")
             },
-            "has the same spectrum as 4",
+            "490 nm",
+            "light-is-another",
             2,
         ),
     ],
 )
 def test_a_wrong_light_is_named_and_the_others_are_kept(
-    quick: Path, change: dict[str, Any], said: str, kept: int
+    quick: Path, change: dict[str, Any], subject: str, code: str, kept: int
 ) -> None:
     result = analyse(changed(part_of(quick), change))
-    assert len([line for line in result.warnings if said in line]) == 1, result.warnings
+    assert of_code(result.warnings, code).subject == subject
     (columns,) = result.samples.values()
     assert len(columns.lights) == kept
 
@@ -227,12 +231,14 @@ def test_lights_in_another_order_and_a_sample_that_bleaches_are_said(quick: Path
         for to, by in (("430 nm", "490 nm"), ("490 nm", "430 nm"))
     }
     result = analyse(changed(part_of(quick), swapped))
-    assert sum("connected in another order" in line for line in result.warnings) == 2
+    assert codes(result.warnings).count("peak-differs") == 2
     part = part_of(quick)
     first = part.protocol.shuffled()[0]
     result = analyse(changed(part, {f"again yellow-textile: {first}": (0.9, {})}))
-    (line,) = result.warnings
-    assert f"yellow-textile: under {first}, read once more at the end" in line
+    (warning,) = result.warnings
+    assert (warning.code, warning.subject) == ("sample-bleached", "yellow-textile")
+    assert warning.values["light"] == first
+    assert warning.values["ratio"]["value"] == pytest.approx(0.9, abs=0.01)
     (columns,) = result.samples.values()
     assert columns.drift.value == pytest.approx(0.9, abs=0.01)
     steady = next(iter(analyse(part).samples.values()))
@@ -244,14 +250,13 @@ def test_a_white_that_fluoresces_is_noticed(tmp_path: Path, quick: Path) -> None
     """The sample stands for a reference that gives back blue and ultraviolet as green."""
     glow = {"white: 365 nm": (1.0, {"yellow-textile: 365 nm": 0.3})}
     result = analyse(changed(part_of(quick), glow))
-    assert any("365 nm" in line and "the reference fluoresces" in line for line in result.warnings)
+    assert of_code(result.warnings, "reference-fluoresces").subject == "365 nm"
 
 
 def test_what_the_room_adds_is_said_and_subtracted(tmp_path: Path) -> None:
     run = record(tmp_path, DIRECT | {"leds": ["430 nm"]}, ambient=1e-3)
     result = analyse(part_of(run))
-    (line,) = result.warnings
-    assert "with all lights off the spectrometer sees light" in line
+    assert codes(result.warnings) == ["light-left"]
     (columns,) = result.samples.values()
     assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
 
@@ -261,8 +266,8 @@ def test_light_that_comes_after_the_dark_is_said_and_subtracted(tmp_path: Path) 
     leak = {"ambient_light": {"level": "0.5 %", "at": "1 min"}}
     run = record(tmp_path, DIRECT | {"leds": ["430 nm"]}, faults=[leak])
     result = analyse(part_of(run))
-    (line,) = result.warnings
-    assert "white: with all LEDs off the light was another than in the dark before" in line
+    (warning,) = result.warnings
+    assert (warning.code, warning.subject) == ("light-left", "white")
     (columns,) = result.samples.values()
     assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
 
@@ -271,7 +276,7 @@ def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Pa
     stuck = {"led_stuck": {"relay": 5}}
     run = record(tmp_path, DIRECT | {"leds": ["490 nm", "430 nm"]}, faults=[stuck])
     result = analyse(part_of(run))
-    assert sum("with all LEDs off the light was another" in line for line in result.warnings) == 1
+    assert codes(result.warnings).count("light-left") == 1
     (columns,) = result.samples.values()
     assert columns.lights == ("430 nm",)
     assert np.sqrt(misfit(columns, "yellow-textile").mean()) == pytest.approx(1.0, abs=0.3)
@@ -281,8 +286,7 @@ def test_an_led_that_stays_lit_is_left_out_and_its_light_subtracted(tmp_path: Pa
 def test_filters_before_the_lamp_are_lights_too_and_leaks_are_said(tmp_path: Path) -> None:
     filters = {"filters": ["bandpass-425", "bandpass-475"], "samples": ["yellow-textile"]}
     result = analyse(part_of(record(tmp_path, filters | {"repetitions": 4})))
-    assert len(result.warnings) == 2
-    assert all("the filter leaks" in line for line in result.warnings)
+    assert codes(result.warnings) == ["filter-leaks"] * 2
     assert [round(light.peak_nm, -1) for light in result.lights] == [440, 480]
     (columns,) = result.samples.values()
     blue = columns.reradiated[:, 0]
@@ -295,7 +299,8 @@ def test_an_unfinished_run_gives_what_it_has(quick: Path) -> None:
     part = part_of(quick)
     done = [attempt for attempt in part.run.attempts if attempt.unit != "yellow-textile: 430 nm"]
     result = analyse(replace(part, run=replace(part.run, attempts=done)))
-    assert "yellow-textile: was not read under 430 nm" in result.warnings
+    unread = of_code(result.warnings, "not-read")
+    assert (unread.subject, unread.values["light"]) == ("yellow-textile", "430 nm")
     only_white = [a for a in part.run.attempts if not a.unit.startswith("yellow")]
     with pytest.raises(DataError, match="no sample was read under a light"):
         analyse(replace(part, run=replace(part.run, attempts=only_white)))

@@ -40,6 +40,7 @@ from tests.analyse.small_runs import EMISSION
 from tests.analyse.spectral_bench import HEIGHT, WIDTH, emitted, record
 from tests.fit import lvf_pictures as made
 from tests.quick_yaml import read_quickly, write_quickly
+from tests.warned import codes, of_code
 
 
 def analysed(run: Path, excluded: frozenset[str] = frozenset()) -> EmissionSpectrumResult:
@@ -162,7 +163,7 @@ def test_states_of_different_colours_are_reported(tmp_path: Path) -> None:
     run = record(tmp_path, EMISSION | {"white": False}, sample=str(material))
     found = analysed(run)
     assert found.patches[""].changes_with_time
-    assert any("the spectrum changes with time" in warning for warning in found.warnings)
+    assert "spectrum-changes" in codes(found.warnings)
 
 
 @pytest.mark.campaign
@@ -170,7 +171,7 @@ def test_a_mercury_lamp_that_did_not_light_is_reported(tmp_path: Path) -> None:
     keys = EMISSION | {"lamps": ["halogen", "mercury"], "white": False, "times": ["2 s", "12 s"]}
     run = record(tmp_path, keys, faults=["mercury_dead"])
     found = analysed(run)
-    assert any("did not light" in warning for warning in found.warnings)
+    assert {"lamp-unlit", "lamp-excites-nothing"} & set(codes(found.warnings))
 
 
 @pytest.mark.campaign
@@ -183,8 +184,7 @@ def test_lines_narrower_than_the_band_are_reported(tmp_path: Path) -> None:
     (tmp_path / "lines.yaml").write_text(write_quickly(content))
     keys = EMISSION | {"white": False, "times": ["2 s"]}
     found = analysed(record(tmp_path, keys, sample=str(tmp_path / "lines.yaml")))
-    (warning,) = (one for one in found.warnings if "lines much narrower" in one)
-    assert "540 to 550 nm" in warning
+    assert of_code(found.warnings, "narrow-lines").values["places_nm"] == ("540 to 550",)
     spectrum = found.patches[""].spectrum
     value, covariance = np.array(spectrum.value), np.array(spectrum.covariance)
     near = np.abs(WAVELENGTH_NM - 545) < 30

@@ -10,6 +10,7 @@ from labrig.foundation.errors import UsageError
 from labrig.material import read_material
 from labrig.process import process_run
 from tests.analyse.recorded import record
+from tests.warned import of_code
 
 GLARE = 0.01
 CALIBRATION: dict[str, Any] = {
@@ -77,12 +78,8 @@ def test_calibrated_it_is_subtracted(camera: CameraFile, tmp_path: Path) -> None
 
 
 def test_not_calibrated_a_line_names_the_dim_patch(tmp_path: Path) -> None:
-    (warning,) = [
-        line
-        for line in process_run(record(tmp_path, DECAY, veiled)).warnings
-        if "veiling glare" in line
-    ]
-    assert warning.startswith("the light of the rest of the frame may veil dim: ")
+    warnings = process_run(record(tmp_path, DECAY, veiled)).warnings
+    assert of_code(warnings, "glare-unmeasured").values["patches"] == ("dim",)
 
 
 def test_a_sample_that_is_most_of_the_light_is_not_veiled(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.compare.run import read_patches
 from labrig.foundation.errors import DataError, FitError, UsageError
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import Misfit, ResultWarning
 from labrig.material import read_material
 from labrig.optics import Strip
 from labrig.process import Processed, process_and_report
@@ -28,6 +29,7 @@ from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import record
 from tests.analyse.spectral_bench import emitted, true_lvf_file
 from tests.quick_yaml import write_quickly
+from tests.warned import of_code
 
 WIDTH, HEIGHT = 192, 64
 PAINTS: dict[str, Region] = {
@@ -153,7 +155,7 @@ def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
     short = Overrides.parse(["orange-paint=0.03,0.5,0.5,0.4"], [])
     own = read_run(run).part(part.name)
     found = analyse_spectra(AnalysisContext(own, part.protocol, rig, short, Inputs.of(rig)))
-    (said,) = (line for line in found.warnings if "expected patch orange-paint below" in line)
+    said = str(of_code(found.warnings, "patch-off-strip"))
     assert "columns 12 to 180" in said
     assert "labrig process RUN --roi orange-paint=x,y,width,height" in said
     assert list(found.patches) == ["blue-paint"]
@@ -208,22 +210,23 @@ def test_rows_of_a_tilted_strip_lie_further_along(down: float, below: float) -> 
 
 def test_one_patch_without_a_result_leaves_the_others() -> None:
     patches = [StripPatch(name, name, (0, 0, 1, 1), alone=False) for name in "ab"]
+    odd = Misfit("odd", "odd")
 
-    def analyse(failing: str) -> Callable[[StripPatch], tuple[str, list[str]]]:
-        def one(patch: StripPatch) -> tuple[str, list[str]]:
+    def analyse(failing: str) -> Callable[[StripPatch], tuple[str, list[ResultWarning]]]:
+        def one(patch: StripPatch) -> tuple[str, list[ResultWarning]]:
             if patch.name in failing:
                 raise FitError("nothing glows")
-            return patch.material, ["odd"]
+            return patch.material, [odd]
 
         return one
 
     results, warnings = for_each_patch(patches, analyse("a"))
     assert results == {"b": "b"}
-    assert warnings == ("a: nothing glows", "b: odd")
+    assert [str(warning) for warning in warnings] == ["a: nothing glows", "b: odd"]
     with pytest.raises(FitError, match="a: nothing glows"):
         for_each_patch(patches, analyse("ab"))
     alone = [StripPatch("a", "paint")]
-    assert for_each_patch(alone, analyse("b")) == ({"": "paint"}, ("odd",))
+    assert for_each_patch(alone, analyse("b")) == ({"": "paint"}, (odd,))
     with pytest.raises(FitError, match=r"^nothing glows"):
         for_each_patch(alone, analyse("a"))
 

@@ -25,6 +25,7 @@ from tests.acceptance.reflectance_pulls import (
 from tests.analyse.recorded import part_of, record
 from tests.analyse.spectral_bench import true_lvf_file
 from tests.results.made import assert_read_back
+from tests.warned import of_code
 
 WIDTH, HEIGHT = 160, 64
 PATCHES = {"plain": [0.03, 0.1, 0.94, 0.39], "prompt": [0.03, 0.51, 0.94, 0.39]}
@@ -65,7 +66,7 @@ def test_the_albedo_is_the_rooms(result: ReflectanceResult) -> None:
     assert np.abs(error / patch.albedo_sigma[JUDGED]).max() < 3
     # σ is of the card and the lamp where a place is bright, and not much more anywhere.
     assert 0.005 < float(np.median((patch.albedo_sigma / patch.albedo)[JUDGED])) < 0.02
-    assert not [line for line in result.warnings if line.startswith("plain")]
+    assert "plain" not in [warning.subject for warning in result.warnings]
 
 
 def test_prompt_fluorescence_is_in_the_radiance_factor_and_not_in_the_albedo(
@@ -78,7 +79,7 @@ def test_prompt_fluorescence_is_in_the_radiance_factor_and_not_in_the_albedo(
     at_460 = int(np.argmin(abs(patch.wavelength_nm - 460)))
     assert patch.radiance_factor[at_460] - expected[at_460] > 0.03
     assert patch.luminescence.value > 10
-    assert any(line.startswith("prompt: prompt fluorescence") for line in result.warnings)
+    assert of_code(result.warnings, "prompt-fluorescence").subject == "prompt"
     red = patch.wavelength_nm > 600
     np.testing.assert_allclose(patch.excess[red], 0, atol=0.01)
 

@@ -12,6 +12,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError, UsageError
 from labrig.process import report_shared_decay
 from labrig.results import OneSided
+from tests.warned import codes
 
 T_S = np.linspace(0, 60, 50)
 RATES = (0.3, 0.04)
@@ -74,7 +75,7 @@ def test_different_rates_are_told() -> None:
         DecayTable(name, T_S, zero, 100 * np.exp(-k * T_S) + rng.standard_normal(50), zero + 1)
         for name, k in (("A", 0.10), ("B", 0.13))
     ]
-    assert any("same rates" in text for text in fit_shared_rates(tables, 1).warnings)
+    assert "rates-not-shared" in codes(fit_shared_rates(tables, 1).warnings)
 
 
 def test_what_cannot_share_is_refused(paths: list[Path]) -> None:

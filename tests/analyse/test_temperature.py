@@ -7,6 +7,7 @@ import pytest
 
 from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.foundation import resources
+from labrig.foundation.result_warning import ResultWarning
 from labrig.material import read_material
 from labrig.process import process_run
 from labrig.protocols.decay.result import DecayResult
@@ -14,6 +15,7 @@ from labrig.record import read_run
 from labrig.report import describe_phosphor
 from tests.analyse.recorded import record
 from tests.quick_yaml import read_quickly, write_quickly
+from tests.warned import codes
 
 DECAY: dict[str, Any] = {
     "protocol": "decay", "charge": "30 s", "first": "1 s", "every": "25 s", "for": "10 min",
@@ -34,13 +36,13 @@ def recorded(folder: Path, **simulation: Any) -> Path:
 def test_a_drifting_room_is_shown_and_reported(tmp_path: Path) -> None:
     run = recorded(tmp_path, temperature={"start": 19, "drift_per_hour": 9})
     result = process_run(run)
-    (said,) = [line for line in result.warnings if "temperature" in line]
-    moved = float(said.partition("moved by ")[2].split()[0])
+    (warning,) = result.warnings
+    assert warning.code == "temperature-moved"
+    moved = warning.values["change_k"]
     frames = read_run(run).frames("decay")
     hours = (frames[-1].start_time - frames[0].start_time) / 3600
     assert moved == pytest.approx(9 * hours, abs=0.3)
-    percent = float(said.partition("changes by about ")[2].split()[0])
-    assert percent == pytest.approx(100 * (1.089**moved - 1), abs=1.5)
+    assert warning.values["rate_change"] == pytest.approx(1.089**moved - 1, abs=0.015)
     page = (run / "result" / "report.html").read_text()
     assert "<h2>Temperature</h2>" in page
     assert "the temperature moved by" in page
@@ -56,7 +58,7 @@ def test_a_drifting_room_is_shown_and_reported(tmp_path: Path) -> None:
 def test_a_steady_room_is_shown_without_a_warning(tmp_path: Path) -> None:
     run = recorded(tmp_path)
     result = process_run(run)
-    assert not [line for line in result.warnings if "temperature" in line]
+    assert not [code for code in codes(result.warnings) if "temperature" in code]
     assert "<h2>Temperature</h2>" in (run / "result" / "report.html").read_text()
 
 
@@ -74,7 +76,7 @@ def test_the_layer_that_the_protocol_states_is_that_of_the_material(tmp_path: Pa
 def test_a_slow_drift_is_told_where_rates_are_known_better(tmp_path: Path) -> None:
     """A quarter of a kelvin in the glow is less than the thermometer shows in its ten minutes."""
 
-    def recorded_for(drift_per_hour: float) -> list[str]:
+    def recorded_for(drift_per_hour: float) -> list[ResultWarning]:
         def change(rig: dict[str, Any]) -> None:
             rig["simulation"] |= {
                 "sensor": {"width": 48, "height": 32},
@@ -83,30 +85,30 @@ def test_a_slow_drift_is_told_where_rates_are_known_better(tmp_path: Path) -> No
 
         folder = tmp_path / str(drift_per_hour)
         result = process_run(record(folder, DECAY | {"charge": "1 h"}, change))
-        return [line for line in result.warnings if "the temperature drifts by" in line]
+        return [each for each in result.warnings if each.code == "temperature-drifts"]
 
     assert recorded_for(0.0) == []
-    (said,) = recorded_for(1.8)
-    assert float(said.partition("drifts by ")[2].split()[0]) == pytest.approx(1.8, abs=0.4)
-    assert float(said.partition("changes by about ")[2].split()[0]) == pytest.approx(2.7, abs=0.8)
+    (warning,) = recorded_for(1.8)
+    assert warning.values["drift_k_per_h"] == pytest.approx(1.8, abs=0.4)
+    assert warning.values["rate_change_percent"] == pytest.approx(2.7, abs=0.8)
 
 
 @pytest.mark.parametrize(
-    ("off", "readings", "told"),
+    ("off", "readings", "code"),
     [
-        pytest.param("0 s", 0, "gave no reading: check it", marks=pytest.mark.campaign),
-        ("1 min", 3, "gave no reading after 2026-01-01 00:0"),
+        pytest.param("0 s", 0, "no-temperature", marks=pytest.mark.campaign),
+        ("1 min", 3, "temperature-ends"),
     ],
 )
 def test_a_thermometer_that_fails_does_not_end_a_run(
-    tmp_path: Path, off: str, readings: int, told: str
+    tmp_path: Path, off: str, readings: int, code: str
 ) -> None:
     run = recorded(tmp_path, faults=[{"thermometer_off": {"at": off}}])
     assert [attempt.exit_status for attempt in read_run(run).attempts] == ["success"] * 2
     assert len(read_run(run).temperatures()) == readings
     result = process_run(run)
-    (said,) = [line for line in result.warnings if "thermometer" in line]
-    assert told in said
+    of_thermometer = {"no-temperature", "temperature-ends"}
+    assert [each for each in codes(result.warnings) if each in of_thermometer] == [code]
 
 
 def test_no_plan_takes_longer_for_it(tmp_path: Path) -> None:
@@ -133,7 +135,7 @@ def test_what_a_temperature_that_was_not_recorded_may_change_is_stated(tmp_path:
     run = record(tmp_path / "without", often, change)
     result = process_run(run)
     assert isinstance(result, DecayResult)
-    assert not [line for line in result.warnings if "temperature" in line]
+    assert not [code for code in codes(result.warnings) if "temperature" in code]
     (patch,) = result.patches.values()
     assert patch.fit is not None
     assert patch.drift_effect is not None

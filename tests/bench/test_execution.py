@@ -2,14 +2,14 @@
 
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from labrig.acquire import Plan, RunObserver
+from labrig.acquire import PlanClock, RunObserver
 from labrig.bench import Recording
 from labrig.foundation.clock import Clock, Interrupted
 from labrig.foundation.errors import DeviceError
@@ -57,7 +57,7 @@ def transfers(rig: Path, protocol: Path, folder: Path, patch: pytest.MonkeyPatch
 
 
 @contextmanager
-def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+def quietly(plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
     yield Watching()
 
 
@@ -143,7 +143,7 @@ def test_ctrl_c_while_waiting_for_a_device_ends_the_wait(
             os.kill(os.getpid(), signal.SIGINT)
 
     @contextmanager
-    def impatiently(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    def impatiently(plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
         yield Impatient()
 
     rig = make_rig(faults=[{"camera_unplugged": {"at": "25 min"}}])

@@ -48,8 +48,8 @@ def test_when_a_blank_is_clean_and_what_leaks() -> None:
     assert not BLANK.is_clean(0.5)
     assert BLANK.leaks() == ()
     leaking = BLANK.model_copy(update={"ambient_dn_per_s": (0.0, 3.0)})
-    (said,) = leaking.leaks()
-    assert "3 ± 0.1 DN/s in G" in said
+    (leak,) = leaking.leaks()
+    assert (leak.values["light_dn_per_s"], leak.values["channel"]) == (3.0, "G")
     with pytest.raises(DataError, match="never became free"):
         BLANK.model_copy(update={"first_clean_s": None}).is_clean(9.0)
 

@@ -13,8 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from labrig.cli import under_way
 from labrig.foundation import colour_science
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.result_warning import as_warnings
 from labrig.optics import (
     CHART_PATCHES,
     CIE_1931,
@@ -60,9 +62,10 @@ def test_pictures_of_all_times_with_what_was_assumed(labrig: Callable[..., Ended
     np.testing.assert_allclose(linear, luminance, rtol=1e-3, atol=1e-3 * luminance.max())
     assert {"000.png", "001.png", "002.png"} <= {path.name for path in folder.iterdir()}
     content = json.loads((folder / "render.json").read_text(encoding="utf-8"))
-    assert any("pink-paint" in note for note in content["notes"])
+    notes = as_warnings(content["notes"])
+    assert any("pink-paint" in note.subject for note in notes)
     # An assumption is in every picture, too, not only below the sheet.
-    assert all(note in comment(folder / "001.png") for note in content["notes"])
+    assert all(str(note) in comment(folder / "001.png") for note in notes)
     dark = read_spectral_exr(folder / "001.exr").radiance
     later = read_spectral_exr(folder / "002.exr").radiance
     # One exponential of 0.027 per second, which the glow itself slows by a part in a thousand.
@@ -158,6 +161,9 @@ def test_on_a_terminal_it_says_what_is_done_and_for_how_long(
     text = TerminalText()
     with monkeypatch.context() as on_terminal:
         on_terminal.setattr(sys, "stderr", text)
+        for patience in ("PATIENCE_S", "FORESEEN_S"):
+            on_terminal.setattr(under_way, patience, 0.0)
+        on_terminal.setattr(under_way, "PERIOD_S", 0.01)
         assert labrig("render", "cornell-box", *SMALL).code == 0
     shown = text.getvalue()
     for what in (
@@ -165,7 +171,7 @@ def test_on_a_terminal_it_says_what_is_done_and_for_how_long(
         "tracing paths of the picture",
         "charging and decay",
     ):
-        assert re.search(what + r".* \d+%.* left", shown), what
+        assert re.search(what + r".*, \d+ of 100, .* left", shown), what
     assert "picture 3 of 3" in shown
     ended = labrig("render", "cornell-box", *SMALL, "--out", "piped")
     assert "tracing" not in ended.err

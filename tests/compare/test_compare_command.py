@@ -189,4 +189,4 @@ def test_without_camera_curves_it_says_so_and_does_the_rest(
     said = compared(labrig, copy)
     assert "linear sRGB" in said["description"]
     assert said["spectra"] == {}
-    assert "--camera" in said["left_out"][0]
+    assert said["left_out"][0]["code"] == "camera-curves-missing"

@@ -17,9 +17,10 @@ from labrig.calibration import FADE_KIND
 from labrig.cli.exit_codes import guarded
 from labrig.compare.glow import glow_sigma, state_signals
 from labrig.compare.photographed_room import PhotographedRoom
-from labrig.compare.rendered import charging_doubts
+from labrig.compare.rendered import charging_warnings
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.result_warning import Misfit
 from labrig.material import (
     SEEN_FACTOR,
     Albedo,
@@ -222,20 +223,20 @@ def test_the_sigma_of_a_glow_of_another_order_is_that_of_its_decay_time() -> Non
 def test_what_a_run_warns_of_its_charging_is_said_of_the_rendering() -> None:
     excited = excitation_result()
     left = excited.patches["left"]
-    law = replace(left, fit=replace(left.fit, warnings=("another law holds",)))
+    warning = Misfit("rate-equation-misfit", "another law holds")
+    law = replace(left, fit=replace(left.fit, warnings=(warning,)))
     right = replace(left, fit=replace(left.fit, warnings=()))
     both = replace(excited, patches={"left": law, "right": right})
     chain = PhosphorResult(parts={"excitation": both}, failed={}, materials={})
-    assert list(charging_doubts(chain, ["left", "right"])) == [
-        "left, excitation: another law holds"
-    ]
+    about_left = warning.about("left, excitation")
+    assert list(charging_warnings(chain, ["left", "right"])) == [about_left]
     # A material that was named takes the place of the run's own.
-    assert not list(charging_doubts(chain, ["right"]))
+    assert not list(charging_warnings(chain, ["right"]))
     alone = PhosphorResult(
         parts={"excitation": replace(excited, patches={"": law})}, failed={}, materials={}
     )
-    assert list(charging_doubts(alone, ["otor"])) == ["excitation: another law holds"]
-    assert not list(charging_doubts(alone, []))
+    assert list(charging_warnings(alone, ["otor"])) == [warning.about("excitation")]
+    assert not list(charging_warnings(alone, []))
 
 
 def test_the_lamps_fade_is_the_measured_one(measured: Path) -> None:
@@ -292,9 +293,9 @@ def test_the_assumption_is_in_the_picture(labrig: Labrig, measured: Path, tmp_pa
     }
     # The same room for `labrig render`, with the assumption in it.
     scene = load_scene(tmp_path / "dark-room.yaml")
-    assert scene.notes == (
-        "sample (double-wide): its albedo is assumed to be 0.5 at all wavelengths",
-    )
+    (assumed,) = scene.notes
+    assert (assumed.code, assumed.subject) == ("albedo-assumed", "sample (double-wide)")
+    assert assumed.values == {"albedo": 0.5}
     renderer = Renderer(scene.resized(width_px=12, height_px=8), threads=1)
     lit, *glow = (float(frame.radiance.sum()) for frame in renderer.frames())
     assert lit > glow[0] > glow[-1] > 0

@@ -29,6 +29,8 @@ def keys(content: object, prefix: str = "") -> Iterator[str]:
         is_named = prefix.rsplit(".", 1)[-1] in {*NAMED, "parameters", "intervals"}
         for name, value in content.items():
             yield from keys(value, f"{prefix}.{'*' if is_named else name}".lstrip("."))
+    elif prefix.rsplit(".", 1)[-1] == "warnings":
+        yield prefix
     elif isinstance(content, list) and content and isinstance(content[0], dict):
         for entry in content:
             yield from keys(entry, f"{prefix}[]")

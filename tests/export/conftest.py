@@ -1,13 +1,13 @@
 """Runs to export: recorded on a simulated bench and processed, once for all tests."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from labrig.acquire import Plan, RunObserver, read_rig_file
+from labrig.acquire import PlanClock, RunObserver, read_rig_file
 from labrig.analyse.overrides import read_run_protocol
 from labrig.bench import Recording
 from labrig.foundation import resources
@@ -73,5 +73,5 @@ def finish(folder: Path, **keys: object) -> Finished:
 
 
 @contextmanager
-def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+def quietly(plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
     yield Watching()

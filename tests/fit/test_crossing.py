@@ -10,6 +10,7 @@ from labrig.fit import fit_luminance
 from labrig.foundation.arrays import FloatArray
 from labrig.material import DECAY_LAWS
 from labrig.results import ForecastTime, LuminanceDecay
+from tests.warned import codes
 
 END_S = 20_000.0
 Curve = Callable[[FloatArray], FloatArray]
@@ -109,11 +110,12 @@ def test_a_scale_of_time_changes_nothing() -> None:
 
 
 def test_a_light_that_is_cut_off_has_no_forecast() -> None:
-    """No sum of exponentials falls ever faster; the warning has the rates."""
+    """No sum of exponentials falls ever faster; the reason in the warning has the rates."""
     decay = cut(lambda t_s: np.asarray(np.exp(-4 * (t_s / END_S) ** 2)), 0.7, 1)
     assert decay.visible_forecast is None
     (warning,) = decay.warnings
-    assert "grows with time, from" in warning
+    assert warning.code == "no-forecast"
+    assert "grows with time, from" in warning.values["reason"]
 
 
 def test_a_record_that_begins_below_has_no_forecast() -> None:
@@ -121,7 +123,7 @@ def test_a_record_that_begins_below_has_no_forecast() -> None:
     decay = fit_luminance(t_s, 0.1 * (t_s / 60) ** -1.0, 0.001)
     assert decay.visible_s is None
     assert decay.visible_forecast is None
-    assert len(decay.warnings) == 1
+    assert codes(decay.warnings) == ["limit-before-record"]
 
 
 def test_what_is_not_determined_has_an_earliest_time() -> None:

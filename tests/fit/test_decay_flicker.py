@@ -8,10 +8,10 @@ from labrig.fit import DecayFit, fit_decay, periodogram
 from labrig.fit.decay.diagnostics import unseen_flicker
 from labrig.foundation.arrays import FloatArray
 from labrig.protocols.steps.random_spacing import RandomSpacing
+from tests.warned import codes
 
 EVEN_S = np.linspace(0.5, 175.5, 36)
 RATE_PER_S, EXPOSURE_S = 0.02, 0.6
-REPEAT = "the residuals repeat every"
 
 
 def random_s(seed: int) -> FloatArray:
@@ -51,15 +51,19 @@ def test_a_beat_that_evenly_spaced_frames_take_for_decay_is_noise_to_random_ones
     assert np.max(np.abs(pulls[1])) < 3
     assert all(fit.unseen_flicker is not None for fit in even)
     assert not any(fit.unseen_flicker for fit in random)
-    found = [line for fit in random for line in fit.warnings if line.startswith(REPEAT)]
-    assert len(found) > 8
-    assert sum(line.startswith(f"{REPEAT} 5.") for line in found) > 8
+    periods_s = [
+        each.values["period_s"]
+        for fit in random
+        for each in fit.warnings
+        if each.code == "residuals-periodic"
+    ]
+    assert sum(5 <= period_s < 6 for period_s in periods_s) > 8
 
 
 def test_a_clean_decay_has_no_warning_whatever_its_spacing() -> None:
     for seed in range(8):
         for t_s in (EVEN_S, random_s(seed)):
-            assert not any(REPEAT in line for line in flickering(t_s, seed, 0.0).warnings)
+            assert "residuals-periodic" not in codes(flickering(t_s, seed, 0.0).warnings)
 
 
 @pytest.mark.parametrize("is_random", [False, True])

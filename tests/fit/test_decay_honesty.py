@@ -15,6 +15,7 @@ from labrig.foundation.arrays import FloatArray
 from tests.acceptance.decay_coverage import LAWS, exponentials, fit, hidden_truth, is_right
 from tests.fit import truths
 from tests.pulls import assert_sigma_is_right
+from tests.warned import codes, of_code
 
 DOUBLE = ((0.1, 1.0), (0.02, 0.5))
 #: So many frames tell a drift.
@@ -23,8 +24,8 @@ DENSE_S: FloatArray = 0.3 + 2.5 * np.arange(74, dtype=np.float64)
 DRIFT = 0.9
 
 
-def _says(each: DecayFit, text: str) -> bool:
-    return any(text in line for line in each.warnings)
+def _warns(each: DecayFit, code: str) -> bool:
+    return code in codes(each.warnings)
 
 
 def test_a_state_that_the_timing_hardly_resolves_is_in_sigma_and_named() -> None:
@@ -41,7 +42,7 @@ def test_a_state_that_the_timing_hardly_resolves_is_in_sigma_and_named() -> None
     silent = [z for z, each in zip(slow, fits, strict=True) if z > 3 and not each.warnings]
     assert len(silent) <= 1
     assert np.median(slow) < 2
-    named = [_says(each, "may hide") or each.n_states == 3 for each in fits]
+    named = [_warns(each, "state-hidden") or each.n_states == 3 for each in fits]
     assert np.mean(named) >= 0.7
 
 
@@ -62,7 +63,7 @@ def test_where_no_state_hides_sigma_is_as_small_as_it_can_be() -> None:
     bound = truths.fisher_rate_sigma(DOUBLE, seen[0], 0.007)
     sigma = np.array([[state.k_r_sigma_per_s for state in each.states] for each in fits])
     assert (np.median(sigma, axis=0) < 1.1 * bound).all()
-    assert sum(_says(each, "may hide") for each in fits) <= 1
+    assert sum(_warns(each, "state-hidden") for each in fits) <= 1
 
 
 @pytest.mark.parametrize("truth", LAWS, ids=lambda truth: truth.name)
@@ -85,7 +86,7 @@ def test_a_tie_of_laws_is_told() -> None:
             )
         )
     assert all(each.law in LAWS[6].right or each.warnings for each in fits)
-    assert any(_says(each, "the data do not tell") for each in fits)
+    assert any(_warns(each, "laws-tied") for each in fits)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +102,7 @@ def test_an_exponential_is_the_limit_of_every_law(seed: int, is_tie: bool) -> No
     bic = {law.name: law.bic_above_best for law in each.compared_laws}
     gain = bic["exponentials"] - min(bic["otor"], bic["becquerel"], bic["stretched"])
     assert gain > (4 if is_tie else 2)
-    assert _says(each, "the data do not tell") == is_tie
+    assert _warns(each, "laws-tied") == is_tie
 
 
 def test_states_that_all_frames_show_are_found_where_few_tell_the_flicker() -> None:
@@ -117,8 +118,8 @@ def test_states_that_were_tried_are_not_advised() -> None:
     signal = np.exp(-0.02 * t_s) * (1 + 0.01 * np.sin(t_s / 8))
     sigma = 0.002 * np.sqrt(signal)
     each = fit_decay(t_s, signal + sigma * rng.normal(size=len(t_s)), sigma)
-    assert _says(each, "neighbouring residuals agree")
-    assert not _says(each, "allow more states")
+    assert _warns(each, "residuals-correlated")
+    assert "--states" not in of_code(each.warnings, "residuals-correlated").values["remedy"]
 
 
 def test_a_free_offset_leaves_a_spectrum_of_rates_its_sigma() -> None:
@@ -180,7 +181,7 @@ def test_the_drift_of_a_lamp_is_in_sigma() -> None:
             flicker=0.007,
             n_states=1,
         )
-        told += _says(each, "noise of neighbouring values correlates")
+        told += _warns(each, "noise-correlated")
         pulls.append((each.states[0].k_r_per_s - 0.02) / each.states[0].k_r_sigma_per_s)
     # Correlations that are averaged over make σ a tenth too large: 0.9.
     assert 0.75 < np.sqrt(np.mean(np.square(pulls))) < 1.1
@@ -224,7 +225,7 @@ def test_a_memory_of_a_frame_is_in_sigma() -> None:
 def test_a_drift_is_told_beside_dark_levels_that_are_known() -> None:
     """Dark levels that were free to follow the drift hid it in most of these."""
     fits = [_with_memory(seed, 0.85, 2e-5) for seed in range(2000, 2010)]
-    told = sum(_says(each, "noise of neighbouring values correlates") for each in fits)
+    told = sum(_warns(each, "noise-correlated") for each in fits)
     assert told >= 6
 
 
@@ -237,7 +238,7 @@ def test_a_flicker_that_is_given_too_large_is_no_drift() -> None:
         each = fit_decay(
             seen.t_s, seen.values, seen.sigma, exposure_s=1.5, channels="RGB", flicker=0.007
         )
-        told += _says(each, "noise of neighbouring values correlates")
+        told += _warns(each, "noise-correlated")
     assert told <= 1
 
 

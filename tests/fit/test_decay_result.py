@@ -12,6 +12,7 @@ from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from tests.fit import truths
+from tests.warned import codes, of_code
 
 DOUBLE = truths.exponentials((0.08, 1.0), (0.015, 0.4))
 T = truths.TIMES_S
@@ -106,56 +107,57 @@ def test_missing_sigma_is_estimated_and_reported() -> None:
 
 def test_one_state_too_few_is_a_misfit() -> None:
     fit = _seen_fit(n_states=1)
-    assert any("1 exponential does not describe" in line for line in fit.warnings)
-    assert any("allow more states" in line for line in fit.warnings)
+    values = of_code(fit.warnings, "residuals-correlated").values
+    assert values["law"] == "1 exponential"
+    assert values["p_value"] < 1e-3
+    assert "--states 2" in values["remedy"]
 
 
 def test_states_the_data_do_not_support_are_dropped_or_ill_determined() -> None:
     fit = _seen_fit(n_states=3)
-    assert any(
-        "3 states were asked for" in line or "% only" in line or "told apart" in line
-        for line in fit.warnings
-    )
+    unsupported = {"states-unsupported", "rate-unresolved", "offset-unresolved"}
+    assert unsupported.intersection(codes(fit.warnings))
 
 
 def test_decay_longer_than_the_record() -> None:
     fit = fit_decay(T, np.exp(-0.002 * T), 0.002)
-    assert any("lives 500 s, longer than the 180 s" in line for line in fit.warnings)
+    values = of_code(fit.warnings, "lifetime-beyond-record").values
+    assert values["lifetime_s"] == pytest.approx(500, rel=0.01)
+    assert values["span_s"] == pytest.approx(180, rel=0.01)
 
 
 def test_constant_under_the_decay_is_noticed() -> None:
     fit = fit_decay(T, np.exp(-0.05 * T) + 0.1, 0.002)
     assert fit.n_states == 2
-    assert any("tell from a constant" in line for line in fit.warnings)
+    assert of_code(fit.warnings, "rate-too-slow").values["state"] == 2
 
 
 def test_changing_colour() -> None:
     values = np.stack([np.exp(-0.05 * T), np.exp(-0.045 * T)], axis=1)
     fit = fit_decay(T, values, np.sqrt(values) / 300 + 1e-4, channels=["R", "G"])
-    assert any("colour changes" in line for line in fit.warnings)
+    assert of_code(fit.warnings, "colour-changes").values["reduced_chi2"] > 1.5
 
 
 def test_offset_far_from_its_prior() -> None:
     values = np.exp(-0.05 * T) + 0.1
     fit = fit_decay(T, values, 0.001, offset_sigma=0.01, n_states=1)
-    assert any("times its prior σ" in line for line in fit.warnings)
-    # Left to choose, a state too slow to tell from a constant takes it over: said as well.
+    assert of_code(fit.warnings, "offset-beyond-prior").values["sigmas"] > 4
+    # Left to choose, a state too slow to resolve from a constant takes it over, with a warning.
     fit = fit_decay(T, values, 0.001, offset_sigma=0.01)
-    assert any("subtract the dark level" in line for line in fit.warnings)
+    assert "--offset" in of_code(fit.warnings, "rate-too-slow").values["remedy"]
 
 
 def test_offset_far_from_its_prior_is_named() -> None:
     values = np.stack([np.exp(-0.05 * T), 0.5 * np.exp(-0.05 * T) + 0.1], axis=1)
     fit = fit_decay(T, values, 0.001, channels="RG", offset_sigma=0.01)
-    (warning,) = [line for line in fit.warnings if "times its prior σ" in line]
-    assert "offset of G" in warning
+    assert of_code(fit.warnings, "offset-beyond-prior").values["channel"] == "G"
 
 
 def test_flicker_from_too_few_bright_frames_is_reported() -> None:
     for seed in range(10):
         seen = truths.observe(truths.exponentials((0.5, 1.0)), seed, weights=np.ones(1))
         fit = fit_decay(seen.t_s, seen.values, seen.sigma, exposure_s=1.5, flicker=None)
-        assert any("give a flicker measured elsewhere" in line for line in fit.warnings)
+        assert "flicker-from-few-frames" in codes(fit.warnings)
         (state,) = fit.states
         assert abs(state.k_r_per_s - 0.5) < 4.5 * state.k_r_sigma_per_s
 
@@ -172,7 +174,7 @@ def test_flicker_from_few_bright_frames_is_in_sigma() -> None:
         )
         (state,) = fit.states
         pulls.append((state.k_r_per_s - 0.35) / state.k_r_sigma_per_s)
-        assert not any("give a flicker" in line for line in fit.warnings)
+        assert "flicker-from-few-frames" not in codes(fit.warnings)
     assert 0.5 < np.sqrt(np.mean(np.square(pulls))) < 1.3
 
 

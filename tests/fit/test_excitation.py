@@ -14,6 +14,7 @@ from labrig.material import Material, dark_step, read_material
 from labrig.results import Charge, ChargingSeries, EarlierCharges, FittedExcitation, Transient
 from tests.fit.charged_samples import BARE, DOOR_S, WEIGHTS, Bench, lvf_windows, two_states
 from tests.pulls import assert_sigma_is_right
+from tests.warned import codes, of_code
 
 LVF = lvf_windows(np.linspace(405, 695, 12))
 CHARGES_S = (8, 32, 64, 128, 256)
@@ -113,7 +114,7 @@ def test_saturation_taken_for_granted_as_in_the_paper() -> None:
 def test_weak_light_leaves_the_level_unknown_and_says_so() -> None:
     bench = Bench(read_material("blue-paint"), irradiance=0.02)
     found = fitted(bench, measured(bench))
-    assert any("charged is not known, nor are Λ" in said for said in found.warnings)
+    assert of_code(found.warnings, "charge-unsaturated").values["sigma_percent"] >= 100
     assert (
         found.at_off[0].amplitude_sigma[0] / found.at_off[0].amplitude[0]
         < found.states[0].amplitude_sigma / found.states[0].amplitude / 5
@@ -160,7 +161,7 @@ def test_a_sample_that_is_no_phosphor_of_these_states_is_reported() -> None:
     series = measured(bench)
     found = fit(series, [0.03], [1.0], RelativeSigmas(bench.flicker, LAMP))
     assert found.reduced_chi2 > 2
-    assert any("reduced χ²" in said for said in found.warnings)
+    assert of_code(found.warnings, "model-misfit").values["reduced_chi2"] > 2
 
 
 @pytest.mark.parametrize("convex", [True, False])
@@ -175,8 +176,7 @@ def test_charging_by_another_law_is_told_from_the_lamps_scatter(convex: bool) ->
     charged = np.repeat([charge.off_s - charge.on_s for charge in through.charges], 12)
     bent = 1 + emptied * np.exp(-charged / 40.0)[:, None, None]
     found = fitted(bench, [bare, replace(through, values=bent * through.values)])
-    (said,) = [line for line in found.warnings if "rate equation says" in line]
-    assert said.startswith(f"long charges glow {'more' if convex else 'less'} and short ones ")
+    assert (of_code(found.warnings, "rate-equation-misfit").values["trend"] > 0) == convex
 
 
 def measured_in_frames(bench: Bench) -> list[ChargingSeries]:
@@ -227,7 +227,7 @@ def test_a_camera_whose_large_signals_fall_short_is_told(missing: float) -> None
         for one, each in zip(series, collected, strict=True)
     ]
     found = fit(series, [0.03], [1.0], RelativeSigmas(bench.flicker, LAMP, scale=0.005))
-    assert any("fall short of proportion" in said for said in found.warnings) == (missing > 0)
+    assert ("sensor-nonlinear" in codes(found.warnings)) == (missing > 0)
 
 
 def test_irradiance_known_badly_goes_into_every_rate() -> None:
@@ -290,7 +290,7 @@ def one_after_another(bench: Bench) -> list[ChargingSeries]:
     return [through, replace(direct, charges=charges, earlier=earlier)]
 
 
-@pytest.mark.parametrize(("order", "defining"), [(1.0, 0), (None, 0), (1.0, 1)])
+@pytest.mark.parametrize(("order", "defining"), [(None, 0), (1.0, 1)])
 def test_the_jacobian_is_that_of_the_residuals(order: float | None, defining: int) -> None:
     through, direct = one_after_another(Bench(two_states()))
     random = np.random.default_rng(4)

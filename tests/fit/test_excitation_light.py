@@ -11,6 +11,7 @@ from labrig.results import ChargingSeries, FittedExcitation
 from labrig.sim.lamp import WAVELENGTH_NM
 from tests.fit.charged_samples import Bench, lvf_windows
 from tests.fit.layers import Layer
+from tests.warned import of_code
 
 #: Places at which three bands excite blue paint.
 WINDOWS = lvf_windows(np.linspace(405, 560, 24))
@@ -91,7 +92,8 @@ def test_a_thick_layer_is_told_from_a_thin_one() -> None:
     assert loss < -0.05
     stated = fit.by_band.charged_glow_by_variance * fit.by_band.light_variance.value
     assert loss == pytest.approx(stated, rel=0.5)
-    assert any("optical density" in line for line in fit.warnings)
+    optical_density = of_code(fit.warnings, "layer-thick").values["optical_density"]
+    assert optical_density == fit.by_band.optical_density
 
 
 def test_a_decay_and_a_hue_that_depend_on_the_exciting_band_are_told() -> None:

@@ -12,6 +12,7 @@ from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS, exponential_means
 from labrig.results import LuminanceDecay, LuminanceRequirement, Measured, Verdict
 from tests.pulls import assert_sigma_is_right
+from tests.warned import of_code
 
 LOGGED_S = np.geomspace(60, 40_000, 60)
 SCALE = 0.005
@@ -131,7 +132,8 @@ def test_a_light_that_stays_is_said() -> None:
     for seed in range(3):
         value, sigma = logged(becquerel, 50 + seed)
         found = fit_luminance(LOGGED_S, value + 0.2, sigma, scale_sigma=SCALE)
-        assert len(found.warnings) == 1
+        light = of_code(found.warnings, "constant-light").values["light_mcd_per_m2"]
+        assert light == pytest.approx(0.2, rel=0.5)
 
 
 def test_slope_and_sum_are_those_of_a_power_law() -> None:

@@ -1,14 +1,21 @@
 """The LVF's calibration: its timeline, what it refuses, and what it finds in the simulated room."""
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from labrig.acquire import ManualStep, Plan, RunObserver, plan, read_protocol, read_rig_file
+from labrig.acquire import (
+    ManualStep,
+    PlanClock,
+    RunObserver,
+    plan,
+    read_protocol,
+    read_rig_file,
+)
 from labrig.bench import Recording, resume_run
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
 from labrig.foundation import resources
@@ -137,7 +144,7 @@ class Person(Watching):
         return ""
 
     @contextmanager
-    def watch(self, plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    def watch(self, plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
         yield self
 
 

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Plan, RigFile, RunObserver, read_protocol, read_rig_file
+from labrig.acquire import PlanClock, RigFile, RunObserver, read_protocol, read_rig_file
 from labrig.bench import Recording, Watch
 from labrig.fit import fit_power_law
 from labrig.foundation.clock import Clock, Interrupted
@@ -57,7 +57,7 @@ class Person(Watching):
         return self._watched
 
     @contextmanager
-    def _watched(self, plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    def _watched(self, plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
         yield self
 
     def frame(self, record: FrameRecord) -> None:

@@ -9,6 +9,7 @@ import tifffile
 from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import LabrigError
+from labrig.foundation.result_warning import as_warnings
 from labrig.optics import read_camera
 from labrig.protocols.decay.analysis import noise_budget
 from labrig.protocols.decay.report import decay_sections
@@ -152,4 +153,4 @@ def decay_report(folder: Path, patches: Sequence[PatchReport] | None = None) -> 
 def page_of(report: DecayReport, warnings: Sequence[str] = ()) -> Report:
     """The page of a decay."""
     found, methods = decay_sections(report)
-    return Report(report.about, tuple(warnings), found, methods, report.frames, report.camera)
+    return Report(report.about, as_warnings(warnings), found, methods, report.frames, report.camera)

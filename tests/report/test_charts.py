@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import product
 from xml.etree import ElementTree
 
 import numpy as np
@@ -55,8 +56,12 @@ def test_points_are_where_the_axes_say(values: list[tuple[float, float]], log: b
 
 def test_matplotlib_draws_them_at_the_same_places() -> None:
     x, y = np.array([0.1, 1.7, 2.9]), np.array([2.0, 50.0, 99.0])
-    for log in (False, True):
-        points = chart(Points("#000000", x, y), logarithmic=log)
+    for across, up in product((False, True), repeat=2):
+        points = chart(Points("#000000", x, y), logarithmic=up)
+        if across:
+            (panel,) = points.panels
+            panel = replace(panel, x=logarithmic_axis("t / s", 0.01, 3.0))
+            points = replace(points, panels=(panel,))
         with figure_style():
             (axes,) = chart_figure(points).axes
             there = axes.transData.transform(np.stack([x, y], axis=1))

@@ -1,6 +1,5 @@
 """From raw values to the screen."""
 
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -166,12 +165,16 @@ def test_the_misfit_is_what_the_docstring_says() -> None:
     np.testing.assert_allclose(rms, [0.09, 0.09, 0.16], atol=0.01)
 
 
-def test_numpy_prints_as_before() -> None:
-    """In a process of its own: other tests import colour-science themselves."""
-    program = (
-        "import numpy as np; from labrig.foundation import colour_science; colour_science.load(); "
-        "print(repr(np.array([1.0, 2.0])))"
+def test_numpy_prints_as_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a package that does when it is imported as colour-science does, which takes seconds."""
+    change = "numpy.set_printoptions(legacy='1.13')"
+    assert "np.set_printoptions(legacy=" in Path(colour_science.load().__file__).read_text(
+        encoding="utf-8"
     )
-    command = [sys.executable, "-c", program]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert ended.stdout.strip() == "array([1., 2.])", ended.stderr
+    (tmp_path / "colour.py").write_text(f"import numpy\n{change}\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, "colour", sys)
+    del sys.modules["colour"]
+    before = np.get_printoptions()
+    assert colour_science.load().__file__ == str(tmp_path / "colour.py")
+    assert np.get_printoptions() == before

@@ -19,6 +19,7 @@ from labrig.foundation.number_format import exposure_text, plus_minus, rounded
         (1.234e-5, 2.1e-7, "(1.234 ± 0.021) × 10⁻⁵"),
         (2.5e7, 1e5, "(2.500 ± 0.010) × 10⁷"),
         (0.0, 0.5, "0.00 ± 0.50"),
+        (2e-4, 3500.0, "2 × 10⁻⁴ ± 3500"),
         (0.08, 0.0, "0.08 (held)"),
         (0.0, 0.0, "0 (held)"),
         (31.23456, math.inf, "31.2 ± ?"),

@@ -1,7 +1,7 @@
 """The page: everything is on it, nothing is fetched, nothing breaks it."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -12,6 +12,7 @@ import pytest
 from labrig.fit import DecayFit
 from labrig.foundation.errors import DiskError
 from labrig.foundation.number_format import plus_minus
+from labrig.foundation.result_warning import as_warnings
 from labrig.record.history import Interruption
 from labrig.report import write_report
 from labrig.report.parameters import quality_rows
@@ -236,21 +237,40 @@ def unknown_sigma() -> PatchReport:
     return PatchReport("table", None, without, patch(series).fit)
 
 
+def single_time() -> PatchReport:
+    return patch(decay_series(1))
+
+
+def two_times() -> PatchReport:
+    return patch(decay_series(2))
+
+
+def monochrome() -> PatchReport:
+    return patch(decay_series(channels=("L",)))
+
+
+def channels_by_wavelength() -> PatchReport:
+    return patch(decay_series(channels=("450 nm", "550 nm")))
+
+
 @pytest.mark.parametrize(
-    "odd",
+    "make",
     [
-        patch(decay_series(1)),
-        patch(decay_series(2)),
-        clipped_series(),
-        negative_series(),
-        noise_series(),
-        unknown_sigma(),
-        patch(decay_series(channels=("L",))),
-        patch(decay_series(channels=("450 nm", "550 nm"))),
+        single_time,
+        two_times,
+        clipped_series,
+        negative_series,
+        noise_series,
+        unknown_sigma,
+        monochrome,
+        channels_by_wavelength,
     ],
-    ids=lambda odd: f"{len(odd.series.t_s)} {odd.series.channels} {odd.series.flag[0]} {odd.name}",
+    ids=lambda make: make.__name__,
 )
-def test_odd_data_are_reported_all_the_same(tmp_path: Path, odd: PatchReport) -> None:
+def test_odd_data_are_reported_all_the_same(
+    tmp_path: Path, make: Callable[[], PatchReport]
+) -> None:
+    odd = make()
     page = Page(written(tmp_path, decay_report(tmp_path, [odd])))
     if isinstance(odd.fit, str):
         assert f"No fit: {odd.fit}" in page.text
@@ -296,7 +316,7 @@ def test_a_warning_about_a_patch_of_several_stands_at_its_row(tmp_path: Path) ->
     fit = patch(decay_series()).fit
     assert isinstance(fit, DecayFit)
     clean = replace(patch(decay_series()), fit=replace(fit, warnings=()), name="a")
-    warned = replace(clean, fit=replace(fit, warnings=("too hot",)), name="b")
+    warned = replace(clean, fit=replace(fit, warnings=as_warnings(["too hot"])), name="b")
     report = decay_report(tmp_path, [clean, warned])
     page = Page(written(tmp_path, report, ["b: too hot"]))
     assert page.text.count("1 warning") == 2

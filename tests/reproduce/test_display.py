@@ -120,8 +120,33 @@ def test_luminance_is_kept_wherever_the_screen_reaches_it(xyz: FloatArray, white
     linear = Display(white).linear(xyz)
     assert ((linear >= 0) & (linear <= 1)).all()
     luminance = np.linalg.inv(XYZ_TO_SRGB)[1] @ linear.T
+    is_reached = (xyz / white @ XYZ_TO_SRGB.T).max(axis=1) <= 1
     # The standard rounds its matrix to 4 digits.
-    np.testing.assert_allclose(luminance, np.clip(xyz[:, 1] / white, 0, 1), rtol=1e-3, atol=1e-9)
+    kept, true = luminance[is_reached], xyz[is_reached, 1] / white
+    np.testing.assert_allclose(kept, true, rtol=1e-3, atol=1e-9)
+    # What is brighter than the screen is never shown brighter than it is.
+    assert (luminance <= xyz[:, 1] / white * 1.001 + 1e-9).all()
+
+
+def oklab(linear: FloatArray) -> FloatArray:
+    """Oklab by colour-science."""
+    colour = colour_science.load()
+    return np.asarray(colour.XYZ_to_Oklab(linear @ np.linalg.inv(XYZ_TO_SRGB).T))
+
+
+@pytest.mark.parametrize("name", CHART_PATCHES)
+def test_a_light_that_grows_keeps_its_hue_and_never_gets_darker(name: str) -> None:
+    """A wall that is lit more and more: no lilac, no salmon, and white at last."""
+    colour = chart(EDGES_NM, "D65")[CHART_PATCHES.index(name)]
+    growing = np.geomspace(0.1, 1e4, 60)[:, np.newaxis] * colour / colour[1]
+    linear = Display(1.0).linear(growing)
+    lightness, a, b = oklab(linear).T
+    assert (np.diff(lightness) > -1e-3).all()
+    assert lightness[-1] > 0.99
+    chroma = np.hypot(a, b)
+    is_coloured = chroma > 0.03
+    hue = np.unwrap(np.arctan2(b, a)[is_coloured])
+    assert hue.size == 0 or np.ptp(hue) < np.radians(6)
 
 
 def test_greys_are_in_the_gamut_however_bright() -> None:
@@ -140,7 +165,7 @@ def test_colours_in_the_gamut_are_not_changed() -> None:
 
 def test_a_colour_out_of_gamut_keeps_its_hue_towards_grey() -> None:
     """A laser of 532 nm: on the line from the colour to its grey, at the edge of the gamut."""
-    laser = np.array([0.1891, 0.8850, 0.0369])
+    laser = 0.5 * np.array([0.1891, 0.8850, 0.0369])
     outside, grey = XYZ_TO_SRGB @ laser, laser[1]
     inside = Display(1.0).linear(laser)
     assert inside.min() == pytest.approx(0.0, abs=1e-12) or inside.max() == pytest.approx(1.0)

@@ -23,6 +23,7 @@ from labrig.optics import delta_e, illuminant, lab
 from labrig.reproduce import Bands, Renderer, of_matrix, of_mixture, tristimulus
 from tests.reproduce.dyes import DYE, INPUT_NM, OUTPUT_NM
 from tests.reproduce.small_scenes import scene
+from tests.warned import of_code
 
 
 def written(folder: Path, dye: ReradiationMixture = DYE, **changed: Any) -> Path:
@@ -130,7 +131,8 @@ def test_noise_that_takes_light_away_is_told() -> None:
         lowest = (surface.matrix - 0.4 * np.eye(24)).min()
         assert len(surface.notes) == is_reported
         if is_reported:
-            assert f"{-lowest:.1%}" in surface.notes[0]
+            negative = of_code(surface.notes, "reradiation-negative")
+            assert negative.values["fraction"] == pytest.approx(-lowest, rel=1e-4)
     with pytest.raises(UsageError, match="≥ 0"):
         of_matrix(replace(matrix, reradiation=matrix.reradiation - 0.003), Bands.even())
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation
+from labrig.foundation.result_warning import as_warnings
 from labrig.material import read_material
 from labrig.protocols.excitation.result import (
     ExcitationResult,
@@ -46,5 +47,7 @@ def excitation_result() -> ExcitationResult:
     patch = PatchExcitation(charging, decay, fit, light, material, closed)
     untested = PatchExcitation(charging, decay, fit, light, material, None)
     return ExcitationResult(
-        irradiance=true_irradiance(), patches={"left": patch, "right": untested}, warnings=("odd",)
+        irradiance=true_irradiance(),
+        patches={"left": patch, "right": untested},
+        warnings=as_warnings(["odd"]),
     )

@@ -16,7 +16,11 @@ from labrig.results import OneSided, with_uncertainty
         (0.5, 0.0, "0.5"),
         (0.5, float("inf"), "0.5(?)"),
         (0.0802, 0.000996, "0.0802(10)"),
-        (2.5e-10, 3.1e-12, "2.500(31)e-10"),
+        (2.5e-10, 3.1e-12, "2.500(31) × 10⁻¹⁰"),
+        (6.23e7, 1e5, "6.230(10) × 10⁷"),
+        (-3.2, 0.5, "−3.20(50)"),
+        (1200.0, 3500.0, "1200(3500)"),
+        (2e-4, 3500.0, "2 × 10⁻⁴ ± 3500"),
     ],
 )
 def test_value_with_uncertainty(value: float, sigma: float, text: str) -> None:

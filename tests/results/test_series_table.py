@@ -272,25 +272,27 @@ def test_sigma_in_a_unit_of_another_quantity_is_refused_with_both_units(unit: st
 
 
 @pytest.mark.parametrize(
-    ("head", "warning"),
+    ("head", "lines", "cell"),
     [
-        ("t,I\n0,OVER\n1,OVER\n", "lines 2 to 3: 'OVER'"),
-        ("t,I,note\n0,OVER,a\n1,O.L,b\n", "line 2: 'OVER'"),
-        ("Gain,5\n\nI,t\nOVER,0\n9,1\n", "line 4: 'OVER'"),
-        ("t,I\ns,V\n0,-\n", "line 3: '-'"),
-        ("# cloud\n0,OVER\n", "line 2: 'OVER'"),
-        ("t / s   I / V\n0  OVER\n", "line 2: 'OVER'"),
+        ("t,I\n0,OVER\n1,OVER\n", "lines 2 to 3", "OVER"),
+        ("t,I,note\n0,OVER,a\n1,O.L,b\n", "line 2", "OVER"),
+        ("Gain,5\n\nI,t\nOVER,0\n9,1\n", "line 4", "OVER"),
+        ("t,I\ns,V\n0,-\n", "line 3", "-"),
+        ("# cloud\n0,OVER\n", "line 2", "OVER"),
+        ("t / s   I / V\n0  OVER\n", "line 2", "OVER"),
     ],
 )
 def test_rows_without_a_value_at_the_head_are_left_out_with_their_line(
-    head: str, warning: str
+    head: str, lines: str, cell: str
 ) -> None:
     rows = "".join(f"{9 - k},{k}\n" if "I,t" in head else f"{k},{9 - k}\n" for k in range(2, 8))
     text = head + (rows if "," in head else rows.replace(",", " "))
     (series,) = parse_series(text, "x")
     assert series.values[-6:, 0].tolist() == [7, 6, 5, 4, 3, 2]
     assert series.t_s[-6:].tolist() == [2, 3, 4, 5, 6, 7]
-    assert series.warnings[0].startswith(warning)
+    warning = series.warnings[0]
+    assert (warning.code, warning.subject) == ("row-without-value", lines)
+    assert warning.values["cell"] == cell
     with pytest.raises(UsageError, match=r"^x: line \d: .* 'much'"):
         parse_series(text.replace("OVER", "much").replace("0,-", "0,much"), "x")
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings, strategies as st
 
 from labrig.foundation.errors import UsageError
 from labrig.results import Series, parse_series
+from tests.warned import of_code
 
 T_S = np.arange(60.0)
 LIGHT = [f"{value:.3f}" for value in 1000 * np.exp(-0.05 * T_S)]
@@ -36,8 +37,9 @@ def test_marks_are_left_out_and_named(mark: str, rows: tuple[int, ...]) -> None:
     assert series.t_s.tolist() == [float(row) for row in kept]
     assert series.values[:, 0].tolist() == [float(LIGHT[row]) for row in kept]
     (warning,) = series.warnings
-    assert warning.startswith(f"line{'s' * (len(rows) > 1)} {rows[0] + 2}")
-    assert mark in warning
+    assert warning.code == "row-without-value"
+    assert warning.subject.startswith(f"line{'s' * (len(rows) > 1)} {rows[0] + 2}")
+    assert warning.values == {"cell": mark, "left_out": len(rows)}
 
 
 def test_what_is_no_number_and_no_mark_is_refused_with_its_line() -> None:
@@ -73,7 +75,8 @@ def test_a_row_that_is_there_twice_counts_once() -> None:
     rows = [*range(20), 19, *range(20, 60), 59]
     series = read([LIGHT[row] for row in rows], [T_S[row] for row in rows])
     assert series.t_s.tolist() == T_S.tolist()
-    assert series.warnings[0].startswith("lines 22, 63: the row before once more")
+    repeated = of_code(series.warnings, "row-repeated")
+    assert (repeated.subject, repeated.values["left_out"]) == ("lines 22, 63", 2)
 
 
 def test_measurements_at_one_time_are_all_kept() -> None:
@@ -87,7 +90,7 @@ def test_readings_that_a_logger_holds_count_once() -> None:
     values = np.repeat(1000 * np.exp(-0.05 * T_S) + noise, 3)
     series = read([f"{value:.3f}" for value in values], np.arange(180))
     assert series.t_s.tolist() == list(range(0, 180, 3))
-    assert "120 rows are left out" in series.warnings[0]
+    assert of_code(series.warnings, "reading-held").values["left_out"] == 120
 
 
 def test_three_values_are_a_ceiling() -> None:
@@ -105,20 +108,23 @@ def test_a_ceiling_is_found_wherever_it_is(begin: int) -> None:
     values[top[2]] = 799
     series = read([f"{value:.0f}" for value in values], np.arange(len(values)))
     assert np.flatnonzero(~series.usable).tolist() == list(range(top[0], top[-1] + 1))
-    assert "saturated" in series.warnings[0]
+    clipped = of_code(series.warnings, "detector-clipped").values
+    assert (clipped["state"], clipped["left_out"]) == ("saturated", top[-1] - top[0] + 1)
 
 
 def test_a_floor_is_left_out_but_not_rare_photons() -> None:
     light = 10 * np.exp(-0.1 * T_S)
     series = read([f"{value if value > 1 else 0:.3f}" for value in light])
     assert series.usable.tolist() == (light > 1).tolist()
-    assert "lowest" in series.warnings[0]
+    clipped = of_code(series.warnings, "detector-clipped").values
+    assert (clipped["state"], clipped["level"]) == ("at its lowest value", 0)
 
 
 def test_a_time_that_goes_back_is_said_or_refused() -> None:
     late = np.where(T_S > 30, T_S - 1.5, T_S)
     (warning,) = read(LIGHT, late).warnings
-    assert warning.startswith("line 33: the time goes back from 30 s to 29.5 s")
+    assert (warning.code, warning.subject) == ("time-goes-back", "line 33")
+    assert warning.values == {"before_s": 30, "after_s": 29.5}
     with pytest.raises(UsageError, match=r"line 42: .*counter"):
         read(LIGHT, T_S % 40)
     assert read(LIGHT[:40] * 2, np.tile(T_S[:40], 2)).warnings == ()
@@ -137,4 +143,4 @@ def test_dates_may_be_beside_their_times() -> None:
 def test_a_clock_too_coarse_for_its_rows_is_said() -> None:
     cells = [f"12:00:{row // 3:02d}" for row in range(60)]
     (warning,) = read(LIGHT, cells).warnings
-    assert "steps of 1 s" in warning
+    assert (warning.code, warning.values) == ("clock-too-coarse", {"resolution_s": 1})

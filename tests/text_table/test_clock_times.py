@@ -74,7 +74,7 @@ def test_any_clock_gives_its_differences_or_is_refused(
     if newest_first and len(cells) == 2 and "no date" in form:
         return  # Two times of day do not tell which is the earlier one.
     assert clock.t_s.tolist() == pytest.approx(true_s.tolist(), abs=1e-12)
-    assert "hour" not in " ".join(clock.warnings) or regular
+    assert not clock.warnings or regular
 
 
 def test_summer_time_between_hourly_rows() -> None:
@@ -82,7 +82,7 @@ def test_summer_time_between_hourly_rows() -> None:
     cells += [f"2026-10-25 {hour:02}:45" for hour in (0, 1, 2, 2, 3, 4, 5)]
     clock = read(*cells)
     assert clock.t_s.tolist() == list(range(0, 3600 * len(cells), 3600))
-    assert "summer time" in clock.warnings[0]
+    assert clock.warnings[0].code == "summer-time"
 
 
 @pytest.mark.parametrize(
@@ -136,13 +136,13 @@ def test_summer_time_ends_and_begins(dates: bool) -> None:
         clock = read(*(cells if dates else [cell[11:] for cell in cells]))
         assert clock.t_s.tolist() == [2 * k for k in range(20)]
         (warning,) = clock.warnings
-        assert warning.startswith("line 12: the clock goes")
+        assert (warning.code, warning.subject) == ("summer-time", "line 12")
 
 
 def test_an_hour_at_another_time_is_a_pause_and_said() -> None:
     clock = read(*_every_two_seconds(datetime(2026, 3, 27, 13, 59, 40), 10, 1))
     assert clock.t_s[-1] == 38 + 3600
-    assert "pause" in clock.warnings[0]
+    assert clock.warnings[0].code == "clock-jumps"
 
 
 def test_a_clock_that_goes_back_for_no_reason_is_refused_with_its_line() -> None:

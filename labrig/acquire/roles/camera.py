@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from labrig.acquire.continuation import Pace
 from labrig.acquire.roles.role import (
     Device,
     ExerciseContext,
@@ -61,11 +62,28 @@ class Camera(Device, Protocol):
 
 
 class PlannedCamera(PlannedDevice):
-    """Stand-in of a camera in a plan, which takes the time that the driver declares."""
+    """Stand-in of a camera in a plan, which takes the time that the driver declares.
 
-    def __init__(self, clock: VirtualClock, capabilities: CameraCapabilities) -> None:
+    Parameters
+    ----------
+    clock
+        Clock of the plan.
+    capabilities
+        Settings that the camera offers.
+    pace
+        Times that frames have taken, which are better known than the driver declares them; None
+        without frames.
+    """
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        capabilities: CameraCapabilities,
+        pace: Pace | None = None,
+    ) -> None:
         self._clock = clock
         self._offers = capabilities
+        self._pace = pace or Pace(capabilities.overhead_s)
         self._settings: ExposureSettings | None = None
 
     def capabilities(self) -> CameraCapabilities:
@@ -75,6 +93,7 @@ class PlannedCamera(PlannedDevice):
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         """Accept settings that are offered."""
         self._offers.check(settings)
+        self._clock.spend(self._pace.change_s)
         self._settings = settings
         return settings
 
@@ -86,7 +105,7 @@ class PlannedCamera(PlannedDevice):
         assert self._settings is not None, "a session configures before it shoots"
         start_s = self._clock.now()
         end_s = start_s + self._settings.exposure_s
-        self._clock.spend(self._settings.exposure_s + self._offers.overhead_s)
+        self._clock.spend(self._settings.exposure_s + self._pace.frame_time_s)
         return Frame(b"", "", start_s, end_s, self._settings)
 
 

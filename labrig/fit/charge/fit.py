@@ -39,6 +39,7 @@ from labrig.fit.profile_likelihood import (
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
+from labrig.foundation.result_warning import Misfit, ResultWarning, Undetermined, Unmeasured
 from labrig.material import MAX_ORDER
 from labrig.results import Measured, OneSided, ProfileInterval
 
@@ -445,7 +446,7 @@ def _result(
     )
     chi2_charge, chi2_decay = problem.chi2_per_reading(fit)
     is_given = problem.light_stimulated is not None
-    doubts = _warnings(
+    warnings = _warnings(
         readings,
         fit,
         states,
@@ -482,7 +483,7 @@ def _result(
         misfit=misfit,
         candidates=candidates,
         chosen=chosen,
-        warnings=tuple(doubts),
+        warnings=tuple(warnings),
         readings=_readings(readings, fit),
         intervals=intervals,
     )
@@ -607,30 +608,50 @@ def _warnings(
     misfit: float,
     chi2: tuple[float, float],
     stimulated: float | None,
-) -> Iterator[str]:
-    """Yield what is doubtful about a fit."""
+) -> Iterator[ResultWarning]:
+    """Yield warnings about a fit."""
     if fit.creeps:
-        yield "the search did not end at a minimum: parameters may move further"
+        yield Undetermined(
+            "fit-unconverged",
+            "the search did not end at a minimum: parameters may move further",
+        )
     if misfit > 1:
         charge, decay = chi2
-        yield (
-            f"the model misses the light by more than noise (χ² per reading {charge:.2f} of the "
-            f"charge, {decay:.2f} of the decay); every σ is enlarged by {np.sqrt(misfit):.1f}"
+        yield Misfit(
+            "model-misfit",
+            "the model misses the light by more than noise (χ² per reading {chi2_charge:.2f} of "
+            "the charge, {chi2_decay:.2f} of the decay); every σ is enlarged by {factor:.1f}",
+            chi2_charge=charge,
+            chi2_decay=decay,
+            factor=np.sqrt(misfit),
         )
     if readings.dark_sigma == 0:
-        yield "no reading before the lamp was on: the dark level is taken for 0"
+        yield Unmeasured(
+            "dark-level-unmeasured",
+            "no reading was taken before the lamp was on: the dark level is assumed to be 0",
+        )
     if stimulated is not None and stimulated >= MAX_STIMULATED:
-        yield (
-            f"η reached its bound, {MAX_STIMULATED:g}: the light under the lamp is not that of "
-            "full traps; give η"
+        yield Misfit(
+            "stimulation-at-bound",
+            "η reached its bound, {bound:g}: the light under the lamp is not that of full traps; "
+            "give η",
+            bound=MAX_STIMULATED,
         )
     for state in states:
         if state.order.value >= MAX_ORDER:
-            yield f"an order reached its bound, {MAX_ORDER:g}: this is no state of general order"
+            yield Misfit(
+                "order-at-bound",
+                "an order reached its bound, {bound:g}: this is no state of general order",
+                bound=MAX_ORDER,
+            )
     if any(np.isinf(state.rate_at_off_per_s.sigma) for state in states):
-        yield "the rate of a state is not determined: record for longer, or more densely"
+        yield Undetermined(
+            "rate-unresolved",
+            "the rate of a state is not determined: record for longer, or more densely",
+        )
     if any(state.kappa_per_s is None for state in states):
-        yield (
-            "κ, k_r and r(0) of a state are not known apart, since its charge does not saturate "
-            "enough: amplitude, τ and p belong to this charge only"
+        yield Undetermined(
+            "charge-unsaturated",
+            "κ, k_r and r(0) of a state are not determined apart, since its charge does not "
+            "saturate enough: amplitude, τ and p belong to this charge only",
         )

@@ -7,6 +7,7 @@ from typing import Any
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import aligned
+from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.results import Measured, OneSided, ProfileInterval, interval_lines, measured_number
 
 UNKNOWN = "–"
@@ -127,7 +128,7 @@ class ChargeFit:
     chosen
         Index of the model among `candidates`.
     warnings
-        Doubts, one a line.
+        Limits of the fit and remedies.
     readings
         What was fitted.
     intervals
@@ -149,12 +150,16 @@ class ChargeFit:
     misfit: float
     candidates: tuple[ChargeCandidate, ...]
     chosen: int
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
     readings: FittedReadings = field(compare=False, repr=False)
     intervals: Mapping[str, ProfileInterval] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        """Return a table of the states, one of the models, and all warnings."""
+        """Return the tables and the warnings, a line each."""
+        return "\n".join([self.table(), *warning_lines(self.warnings)])
+
+    def table(self) -> str:
+        """Return a table of the states and one of the models."""
         lines = [
             f"{self.candidates[self.chosen].label}, after {self.charge_s:g} s of charge",
             f"reduced χ²  charge {self.chi2_charge:.2f} ({self.n_charge} readings), "
@@ -169,7 +174,7 @@ class ChargeFit:
             lines.append("<, >: at a bound of what is possible, limit of 95 % probability")
         lines += interval_lines(self.named_intervals)
         lines += aligned(self.model_rows())
-        return "\n".join([*lines, *(f"! {line}" for line in self.warnings)])
+        return "\n".join(lines)
 
     @property
     def is_any_one_sided(self) -> bool:
@@ -234,7 +239,7 @@ class ChargeFit:
             "intervals": {name: each.to_dict() for name, each in self.intervals.items()},
             "candidates": [vars(candidate) for candidate in self.candidates],
             "chosen": self.chosen,
-            "warnings": list(self.warnings),
+            "warnings": [each.to_dict() for each in self.warnings],
         }
         return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 

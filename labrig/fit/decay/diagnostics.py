@@ -1,4 +1,4 @@
-"""Diagnostics of a decay fit: warnings in one line each, with a remedy.
+"""Diagnostics of a decay fit: warnings with their values and a remedy.
 
 Randomly spaced frames show a flicker of any period as a line in the periodogram of the residuals
 (N. R. Lomb, Astrophysics and Space Science 39, 447, 1976; J. D. Scargle, Astrophysical Journal 263,
@@ -15,7 +15,14 @@ from scipy.special import chdtr, chdtrc, fdtrc, ndtr
 
 from labrig.fit.decay.states import APART_SIGMAS, ILL_DETERMINED, sigmas_apart
 from labrig.foundation.arrays import FloatArray
-from labrig.foundation.number_format import rounded
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    Extrapolated,
+    Misfit,
+    ResultWarning,
+    Undetermined,
+)
 from labrig.results import DecayState, UnseenFlicker
 
 #: Values below which neither is looked for, and first values that are looked at.
@@ -63,6 +70,17 @@ class Periodogram:
     def period_s(self) -> float:
         """Period of the highest line in seconds."""
         return 1 / float(self.frequency_hz[np.argmax(self.power)])
+
+    @property
+    def aliases_s(self) -> tuple[float, ...]:
+        """Longest other periods in seconds that the highest line of evenly spaced values may have.
+
+        Empty where they are not evenly spaced.
+        """
+        if self.spacing_s is None:
+            return ()
+        rate, own = 1 / self.spacing_s, 1 / self.period_s
+        return 1 / (rate - own), 1 / (rate + own)
 
     @property
     def p_value(self) -> float:
@@ -190,9 +208,9 @@ MISFIT_LEVEL = 5e-4
 MIN_FOR_ORDER = 8
 #: Reduced χ² below which σ is doubted: 0.6 of the scatter that it says, if not by chance.
 TOO_SMALL_CHI2 = 0.36
-#: σ of log k from which a rate is said to be known badly: errors of such a rate are far from
-#: symmetric, and beyond 3 σ more often than σ says.
-KNOWN_BADLY = 0.2
+#: σ of log k from which a rate is unresolved: its errors are far from symmetric, and beyond 3 σ
+#: more often than σ says.
+UNRESOLVED = 0.2
 #: Ratio to the slowest rate searched below which a rate is at that bound.
 NEAR_BOUND = 1.001
 BELOW_ZERO_SIGMAS = 5.0
@@ -205,7 +223,7 @@ MAX_NAMED = 2
 
 
 @dataclass(frozen=True)
-class Misfit:
+class FitResiduals:
     """Residuals of the selected fit, split into common-mode and colour.
 
     Attributes
@@ -237,85 +255,112 @@ class Misfit:
     repeat: NDArray[np.intp]
 
 
-def misfit_warnings(misfit: Misfit, subject: str, remedy: str) -> list[str]:
+def misfit_warnings(residuals: FitResiduals, law: str, remedy: str) -> list[ResultWarning]:
     """Test the order, the scatter and the colour of the residuals against the noise.
 
     Parameters
     ----------
-    misfit
+    residuals
         The residuals.
-    subject
-        Law that was fitted, with the verb "do".
+    law
+        Law that was fitted, such as `2 exponentials`.
     remedy
         Advice if the shape is wrong.
     """
-    warnings = _outlier_warnings(misfit)
-    disturbed = bool(warnings)
-    p_order = order_p_value(misfit.frames)
+    outliers = _outlier_warnings(residuals)
+    warnings: list[ResultWarning] = [*outliers]
+    p_order = order_p_value(residuals.frames)
     if p_order < MISFIT_LEVEL:
         warnings.append(
-            f"{subject} not describe this decay: neighbouring residuals agree "
-            f"(p = {p_order:.1g}); {remedy}"
+            Misfit(
+                "residuals-correlated",
+                "the fit of {law} does not describe this decay: neighbouring residuals agree (p = "
+                "{p_value:.1g}); {remedy}",
+                law=law,
+                p_value=p_order,
+                remedy=remedy,
+            )
         )
-    frame_chi2 = float(misfit.frames @ misfit.frames)
-    frame_p = _excess_p_value(frame_chi2, misfit.frame_dof, misfit.noise_dof)
-    if frame_p < MISFIT_LEVEL <= p_order and not disturbed:
-        factor = np.sqrt(frame_chi2 / misfit.frame_dof)
+    frame_chi2 = float(residuals.frames @ residuals.frames)
+    frame_p = _excess_p_value(frame_chi2, residuals.frame_dof, residuals.noise_dof)
+    if frame_p < MISFIT_LEVEL <= p_order and not outliers:
         warnings.append(
-            f"frames scatter {factor:.2g} times as much as σ and flicker explain; every σ given "
-            "here is too small by about that: estimate the flicker (--flicker auto) or check σ"
+            Misfit(
+                "scatter-exceeds-sigma",
+                "frames scatter {factor:.2g} times as much as σ and flicker explain; every σ given "
+                "here is too small by about that: estimate the flicker (--flicker auto) or check σ",
+                factor=np.sqrt(frame_chi2 / residuals.frame_dof),
+            )
         )
-    if _excess_p_value(misfit.colour_chi2, misfit.colour_dof, np.inf) < MISFIT_LEVEL:
+    if _excess_p_value(residuals.colour_chi2, residuals.colour_dof, np.inf) < MISFIT_LEVEL:
         warnings.append(
-            "the colour changes during the decay more than σ allows (reduced χ² between the "
-            f"channels {misfit.colour_chi2 / misfit.colour_dof:.3g}): check dark level and σ of "
-            "each channel, or fit the channels one by one"
+            Misfit(
+                "colour-changes",
+                "the colour changes during the decay more than σ allows (reduced χ² between the "
+                "channels {reduced_chi2:.3g}): check dark level and σ of each channel, or fit the "
+                "channels one by one",
+                reduced_chi2=residuals.colour_chi2 / residuals.colour_dof,
+            )
         )
-    return warnings + _flicker_warnings(misfit)
+    return warnings + _flicker_warnings(residuals)
 
 
-def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> list[str]:
+def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> list[ResultWarning]:
     """Return a warning if the values lie much closer to the fit than σ says."""
     if dof < 1 or chi2 >= TOO_SMALL_CHI2 * dof or chdtr(dof, chi2) > MISFIT_LEVEL:
         return []
-    times = rounded(float(np.sqrt(dof / chi2)), 2) if chi2 > 0 else "∞"
-    closer = f"the values lie {times} times closer to the fit than σ says"
+    factor = float(np.sqrt(dof / chi2)) if chi2 > 0 else np.inf
     if sigma_from_scatter:
         return [
-            f"{closer}: their scatter is below what the curve resolves against which σ was "
-            "measured, and every σ given here is an upper bound; give the values' σ if it is known"
+            Undetermined(
+                "sigma-upper-bound",
+                "the values lie {factor:2r} times closer to the fit than σ implies: their scatter "
+                "is below what the curve resolves against which σ was measured, and every σ given "
+                "here is an upper bound; give the values' σ if you have it",
+                factor=factor,
+            )
         ]
     return [
-        f"{closer}: σ is too large, and with it every σ given here, or another quantity; check its "
-        "column and its unit, or leave it out, and it is taken from the scatter"
+        Contradiction(
+            "sigma-too-large",
+            "the values lie {factor:2r} times closer to the fit than σ implies: σ is too large, "
+            "and with it every σ given here, or it is another quantity; check its column and its "
+            "unit, or leave it out, and it is taken from the scatter",
+            factor=factor,
+        )
     ]
 
 
-def _outlier_warnings(misfit: Misfit) -> list[str]:
+def _outlier_warnings(residuals: FitResiduals) -> list[Disturbance]:
     """Return a warning for each frame that is far from the curve compared with the others."""
-    size = np.abs(misfit.frames)
+    size = np.abs(residuals.frames)
     if len(size) < MIN_FOR_ORDER:
         return []
     # The median does not mind the outlier, whatever σ and flicker were made of it.
     typical = 1.4826 * float(np.median(size))
     outliers = np.flatnonzero((size > OUTLIER_SIGMAS * typical) & (size > OUTLIER_OWN_SIGMAS))
     return [
-        f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(typical, 1e-3):.0f} times as "
-        "far off the curve as the others do: look at it, leave it out if something disturbed it "
-        "(labrig process --exclude, labrig fit decay --from, or its row)"
+        Disturbance(
+            "frame-outlier",
+            "the frame at {t_s:.4g} s lies {factor:.0f} times as far off the curve as the others "
+            "do: look at it, leave it out if something disturbed it (labrig process --exclude, "
+            "labrig fit decay --from, or its row)",
+            t_s=residuals.t_s[row],
+            factor=size[row] / max(typical, 1e-3),
+        )
         for row in outliers[np.argsort(-size[outliers])][:MAX_NAMED]
     ]
 
 
-def _flicker_warnings(misfit: Misfit) -> list[str]:
+def _flicker_warnings(residuals: FitResiduals) -> list[ResultWarning]:
     """Return a warning if the residuals after one of the charges repeat periodically."""
-    repeats = [misfit.repeat == one for one in np.unique(misfit.repeat)]
+    repeats = [residuals.repeat == one for one in np.unique(residuals.repeat)]
     lines = [
         (found, rows)
         for rows in repeats
         if (
             found := periodogram(
-                misfit.middle_s[rows], misfit.frames[rows], misfit.signal_to_noise[rows]
+                residuals.middle_s[rows], residuals.frames[rows], residuals.signal_to_noise[rows]
             )
         )
         is not None
@@ -326,24 +371,34 @@ def _flicker_warnings(misfit: Misfit) -> list[str]:
     p_value = min(found.p_value * len(lines), 1.0)
     if p_value > MISFIT_LEVEL:
         return []
-    phase = 2 * np.pi * misfit.middle_s[rows] / found.period_s
-    sine = misfit.signal_to_noise[rows] * np.stack([np.cos(phase), np.sin(phase)])
-    amplitude = np.linalg.norm(np.linalg.lstsq(sine.T, misfit.frames[rows])[0])
+    phase = 2 * np.pi * residuals.middle_s[rows] / found.period_s
+    sine = residuals.signal_to_noise[rows] * np.stack([np.cos(phase), np.sin(phase)])
+    amplitude = np.linalg.norm(np.linalg.lstsq(sine.T, residuals.frames[rows])[0])
+    if found.spacing_s is None:
+        return [
+            Disturbance(
+                "residuals-periodic",
+                "the residuals repeat every {period_s:3r} s, by ±{amplitude_percent:2r} % (p = "
+                "{p_value:.1g}): light or camera flickers; σ allows for it as for noise, find its "
+                "source (a power supply, a regulated temperature)",
+                period_s=found.period_s,
+                amplitude_percent=100 * amplitude,
+                p_value=p_value,
+            )
+        ]
     return [
-        f"the residuals repeat every {rounded(found.period_s, 3)} s, by ±"
-        f"{rounded(100 * float(amplitude), 2)} % (p = {p_value:.1g}){_aliases(found)}: light or "
-        "camera flickers; σ allows for it as for noise, find its source (a power supply, a "
-        "regulated temperature)"
+        Disturbance(
+            "residuals-periodic",
+            "the residuals repeat every {period_s:3r} s, by ±{amplitude_percent:2r} % (p = "
+            "{p_value:.1g}), or every {aliases_s:3r}, … s, periods that evenly spaced frames do "
+            "not resolve from it: light or camera flickers; σ allows for it as for noise, find its "
+            "source (a power supply, a regulated temperature)",
+            period_s=found.period_s,
+            amplitude_percent=100 * amplitude,
+            p_value=p_value,
+            aliases_s=found.aliases_s,
+        )
     ]
-
-
-def _aliases(line: Periodogram) -> str:
-    """Return which other periods the line of evenly spaced frames may have."""
-    if line.spacing_s is None:
-        return ""
-    rate, own = 1 / line.spacing_s, 1 / line.period_s
-    others = [f"{rounded(1 / frequency, 3)} s" for frequency in (rate - own, rate + own)]
-    return f", or every {others[0]}, {others[1]}, …, which evenly spaced frames do not tell apart"
 
 
 def order_p_value(residuals: FloatArray) -> float:
@@ -380,7 +435,7 @@ def state_warnings(
     rate_bounds_per_s: tuple[float, float],
     all_needed: bool,
     free_offset: bool,
-) -> list[str]:
+) -> list[ResultWarning]:
     """Return warnings about rates that the data do not constrain.
 
     Parameters
@@ -398,64 +453,109 @@ def state_warnings(
     free_offset
         Whether a constant without prior was fitted.
     """
-    warnings = []
+    warnings: list[ResultWarning] = []
     more_light = "take more light" if all_needed else "ask for fewer states or take more light"
     sigma = np.sqrt(np.diag(log_rate_covariance))
     slowest, fastest = rate_bounds_per_s
     lifetime_s = 1 / states[-1].k_r_per_s
     for number, state in enumerate(states, start=1):
-        rate = f"k{number} = {state.k_r_per_s:.3g} /s"
         if state.k_r_sigma_per_s == 0:
             continue
         if state.k_r_per_s < NEAR_BOUND * slowest:
             warnings.append(
-                f"{rate} is the slowest rate {span_s:.4g} s can tell from a constant: "
-                + ("" if free_offset else "subtract the dark level, fit an offset ")
-                + ("" if free_offset else "(labrig fit decay --offset) or ")
-                + "record longer"
+                Undetermined(
+                    "rate-too-slow",
+                    "k{state} = {rate_per_s:.3g} /s is the slowest rate that {span_s:.4g} s "
+                    "resolve from a constant: {remedy}",
+                    state=number,
+                    rate_per_s=state.k_r_per_s,
+                    span_s=span_s,
+                    remedy=(
+                        "record longer"
+                        if free_offset
+                        else "subtract the dark level, fit an offset (labrig fit decay --offset) "
+                        "or record longer"
+                    ),
+                )
             )
         elif state.k_r_per_s > 0.999 * fastest:
             warnings.append(
-                f"{rate} is the fastest rate the steps in time can tell: take the first frames "
-                "closer together, or start after the lamp's own glow (labrig fit decay --from)"
+                Undetermined(
+                    "rate-too-fast",
+                    "k{state} = {rate_per_s:.3g} /s is the fastest rate that the steps in time "
+                    "resolve: take the first frames closer together, or start after the lamp's own "
+                    "glow (labrig fit decay --from)",
+                    state=number,
+                    rate_per_s=state.k_r_per_s,
+                )
             )
-        elif sigma[number - 1] > KNOWN_BADLY:
+        elif sigma[number - 1] > UNRESOLVED:
             long_lived = number == len(states) and lifetime_s > span_s
             warnings.append(
-                f"{rate} is known to {100 * sigma[number - 1]:.0f} % only: "
-                + ("record longer" if long_lived else more_light)
+                Undetermined(
+                    "rate-unresolved",
+                    "k{state} = {rate_per_s:.3g} /s is determined to {sigma_percent:.0f} % only: "
+                    "{remedy}",
+                    state=number,
+                    rate_per_s=state.k_r_per_s,
+                    sigma_percent=100 * sigma[number - 1],
+                    remedy="record longer" if long_lived else more_light,
+                )
             )
     log_rates = np.log([state.k_r_per_s for state in states])
     for number, apart in enumerate(sigmas_apart(log_rates, log_rate_covariance), start=1):
         is_constant = states[number].k_r_per_s < NEAR_BOUND * slowest
         if apart < APART_SIGMAS and not (all_needed and is_constant):
-            advice = (
-                "fewer states do not describe this decay: record longer, or take more light"
-                if all_needed
-                else f"ask for one state fewer (--states {len(states) - 1})"
+            warnings.append(
+                Undetermined(
+                    "rates-indistinct",
+                    "k{faster} and k{slower} cannot be distinguished: {remedy}",
+                    faster=number,
+                    slower=number + 1,
+                    sigmas_apart=apart,
+                    remedy=(
+                        "fewer states do not describe this decay: record longer, or take more light"
+                        if all_needed
+                        else f"ask for one state fewer (--states {len(states) - 1})"
+                    ),
+                )
             )
-            warnings.append(f"k{number} and k{number + 1} cannot be distinguished: {advice}")
     is_fixed = states[-1].k_r_sigma_per_s == 0
     if free_offset and not is_fixed and sigma[-1] > ILL_DETERMINED:
         warnings.append(
-            "the free offset and the slowest state can hardly be told apart: give the offset "
-            "(labrig fit decay --offset zero, or the σ of what was subtracted) or record longer"
+            Undetermined(
+                "offset-unresolved",
+                "the data hardly resolve the free offset from the slowest state: give the offset "
+                "(labrig fit decay --offset zero, or the σ of what was subtracted) or record "
+                "longer",
+                sigma_percent=100 * sigma[-1],
+            )
         )
-    if lifetime_s > span_s and not is_fixed and sigma[-1] <= KNOWN_BADLY:
+    if lifetime_s > span_s and not is_fixed and sigma[-1] <= UNRESOLVED:
         warnings.append(
-            f"the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s recorded: "
-            "record longer to be sure of it"
+            Extrapolated(
+                "lifetime-beyond-record",
+                "the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s "
+                "recorded: record longer to be sure of it",
+                lifetime_s=lifetime_s,
+                span_s=span_s,
+            )
         )
     return warnings
 
 
 def offset_warnings(
     channels: tuple[str, ...], offsets: FloatArray, prior_sigma: FloatArray
-) -> list[str]:
+) -> list[ResultWarning]:
     """Return warnings about fitted offsets (C,) far from their priors, both in the same unit."""
     return [
-        f"the offset of {name} is {abs(offset) / sigma:.0f} times its prior σ from zero: "
-        "a light may have come on, or the dark level is wrong; else its σ is too small"
+        Contradiction(
+            "offset-beyond-prior",
+            "the offset of {channel} is {sigmas:.0f} times its prior σ from zero: a light may have "
+            "come on, or the dark level is wrong; else its σ is too small",
+            channel=name,
+            sigmas=abs(offset) / sigma,
+        )
         for name, offset, sigma in zip(channels, offsets, prior_sigma, strict=True)
         if 0 < sigma < np.inf and abs(offset) >= OFFSET_SIGMAS * sigma
     ]
@@ -475,7 +575,7 @@ def rise_in_sigmas(signal: FloatArray, information: FloatArray) -> float:
     return float((last - first) / np.sqrt(first_variance + last_variance))
 
 
-def below_zero_warnings(signal: FloatArray, information: FloatArray) -> list[str]:
+def below_zero_warnings(signal: FloatArray, information: FloatArray) -> list[ResultWarning]:
     """Return a warning if the last quarter of the frames is below zero.
 
     The arguments are those of `rise_in_sigmas`.
@@ -485,8 +585,12 @@ def below_zero_warnings(signal: FloatArray, information: FloatArray) -> list[str
     if last > -BELOW_ZERO_SIGMAS * np.sqrt(variance):
         return []
     return [
-        f"the signal falls below zero, by {-last / np.sqrt(variance):.0f} σ in the last quarter of "
-        "the frames: too much was subtracted, check the dark level or fit an offset (--offset)"
+        Contradiction(
+            "signal-below-zero",
+            "the signal falls below zero, by {sigmas:.0f} σ in the last quarter of the frames: too "
+            "much was subtracted, check the dark level or fit an offset (--offset)",
+            sigmas=-last / np.sqrt(variance),
+        )
     ]
 
 

@@ -14,7 +14,7 @@ from scipy.special import chdtrc
 
 from labrig.fit.decay.diagnostics import (
     MISFIT_LEVEL,
-    Misfit,
+    FitResiduals,
     below_zero_warnings,
     misfit_warnings,
     offset_warnings,
@@ -32,7 +32,13 @@ from labrig.fit.decay.variable_projection import JointFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
-from labrig.foundation.number_format import rounded
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    Misfit,
+    ResultWarning,
+    Undetermined,
+)
 from labrig.results import (
     EXPONENTIALS,
     LAW_LABELS,
@@ -41,9 +47,9 @@ from labrig.results import (
     DecayState,
     FittedLaw,
     FittedRateSpectrum,
+    Measured,
     ScatterSigma,
     recommended_sampling,
-    with_uncertainty,
 )
 
 #: Significance of a bend in σ, a chance of 6 in 100,000 without one.
@@ -85,7 +91,7 @@ class Bend:
 
 
 def bend(data: WhitenedSeries, fit: StatesFit, covariance: FloatArray) -> Bend | None:
-    """Return the bend of the sensor as the channels' ratios tell it; None if they do not.
+    """Return the bend of the sensor by the channels' ratios; None if they do not determine it.
 
     Parameters
     ----------
@@ -128,17 +134,21 @@ def bend(data: WhitenedSeries, fit: StatesFit, covariance: FloatArray) -> Bend |
     )
 
 
-def bend_warnings(found: Bend | None) -> list[str]:
+def bend_warnings(found: Bend | None) -> list[ResultWarning]:
     """Return a warning where a bend of the sensor matters."""
     if found is None or not found.is_evident:
         return []
-    percent = with_uncertainty(100 * abs(found.at_brightest), 100 * found.sigma)
-    how = "fall short of" if found.at_brightest < 0 else "exceed"
     return [
-        f"bright values {how} proportion, by {percent} % at the brightest: the channels' ratios "
-        "change with their level, as of a sensor that is not linear, which moves rates and "
-        f"amplitudes by up to {found.effect_sigmas:.2g} σ; expose for less, or it is the states "
-        "that differ in colour: fit the channels one by one"
+        Disturbance(
+            "sensor-nonlinear",
+            "bright values {direction} proportion, by {deviation} at the brightest: the channels' "
+            "ratios change with their level, as of a sensor that is not linear, which moves rates "
+            "and amplitudes by up to {effect_sigmas:.2g} σ; expose for less, or it is the states "
+            "that differ in colour: fit the channels one by one",
+            direction="fall short of" if found.at_brightest < 0 else "exceed",
+            deviation=Measured(100 * abs(found.at_brightest), 100 * found.sigma, "%"),
+            effect_sigmas=found.effect_sigmas,
+        )
     ]
 
 
@@ -224,13 +234,13 @@ class FitDiagnostics:
 
     @property
     def sigma_dof(self) -> float:
-        """Degrees of freedom that told the σ of the values; infinite where they were given."""
+        """Degrees of freedom of the values' estimated σ; infinite where it was given."""
         estimated = self.scatter or self.sigma_scale
         return np.inf if estimated is None else estimated.dof
 
     @property
     def student(self) -> float:
-        """Factor ν/(ν − 2) of every variance where σ was told by ν degrees of freedom.
+        """Factor ν/(ν − 2) of every variance where σ was estimated with ν degrees of freedom.
 
         Unweighted least squares has none, as every program's.
         """
@@ -263,7 +273,7 @@ class FitDiagnostics:
 
 
 def student_factor(dof: float) -> float:
-    """Return ν/(ν − 2), the factor of a variance whose σ was told by ν degrees of freedom."""
+    """Return ν/(ν − 2), the factor of a variance whose σ has ν degrees of freedom."""
     if np.isinf(dof):
         return 1.0
     return dof / (dof - 2) if dof > 2 else float("inf")
@@ -311,8 +321,8 @@ def warnings_about(
     hidden: HiddenState | None,
     correlation: NoiseCorrelation | None,
     bent: Bend | None,
-) -> list[str]:
-    """Return the warnings about a fit, one line each.
+) -> list[ResultWarning]:
+    """Return the warnings about a fit.
 
     Parameters
     ----------
@@ -329,48 +339,73 @@ def warnings_about(
     correlation
         Correlation of neighbouring values' noise; None if it is not likely.
     bent
-        Bend of the sensor; None if the channels do not tell it.
+        Bend of the sensor; None if the channels do not determine it.
     """
     series, joint = data.series, fit.joint
-    warnings = []
+    warnings: list[ResultWarning] = []
     if fit.dof(data) <= 0:
         warnings.append(
-            "there are no more values than parameters: nothing is left to test the fit with; "
-            "record more"
+            Undetermined(
+                "no-degrees-of-freedom",
+                "there are no more values than parameters: nothing is left to test the fit with; "
+                "record more",
+                degrees_of_freedom=fit.dof(data),
+            )
         )
     if diagnostics.noise_dof < MIN_NOISE_DOF and diagnostics.scatter:
         warnings.append(
-            f"σ was taken from the scatter of {max(diagnostics.noise_dof, 0):.0f} values to spare: "
-            "give each value's σ in a column sigma, or record more"
+            Undetermined(
+                "sigma-from-few-values",
+                "σ was taken from the scatter of {spare_values:.0f} values to spare: give each "
+                "value's σ in a column sigma, or record more",
+                spare_values=max(diagnostics.noise_dof, 0),
+            )
         )
     elif diagnostics.sigma_scale is not None:
-        factor = rounded(diagnostics.sigma_scale.factor, 2)
         warnings.append(
-            f"the values scatter {factor} times as much as their σ says, and it was multiplied by "
-            "that: check its column and its unit"
+            Contradiction(
+                "sigma-rescaled",
+                "the values scatter {factor:2r} times as much as their σ implies, and it was "
+                "multiplied by that: check its column and its unit",
+                factor=diagnostics.sigma_scale.factor,
+            )
         )
     elif diagnostics.noise_dof < MIN_FLICKER_DOF:
         warnings.append(
-            f"flicker was estimated from {max(diagnostics.noise_dof, 1):.0f} frames' worth of "
-            "bright signal: give a flicker measured elsewhere, or record more "
-            "frames while it is bright"
+            Undetermined(
+                "flicker-from-few-frames",
+                "flicker was estimated from {bright_frames:.0f} frames' worth of bright signal: "
+                "give a flicker measured elsewhere, or record more frames while it is bright",
+                bright_frames=max(diagnostics.noise_dof, 1),
+            )
         )
     if joint.least_squares.creeps:
         warnings.append(
-            "the fit still creeps: rates and amplitudes may trade off; ask for fewer states "
-            "(--states) or record longer"
+            Undetermined(
+                "fit-unconverged",
+                "the fit has not converged: rates and amplitudes may trade off; ask for fewer "
+                "states (--states) or record longer",
+            )
         )
     warnings += [
-        f"the fit of {LAW_LABELS[name]} did not end at a minimum: it is not compared with the "
-        "others; record longer, or with less noise"
+        Undetermined(
+            "law-unconverged",
+            "the fit of {law} did not end at a minimum: it is not compared with the others; record "
+            "longer, or with less noise",
+            law=LAW_LABELS[name],
+        )
         for name in diagnostics.unfinished_laws
     ]
     requested = diagnostics.asked or diagnostics.n_fixed
     if fit.n_states < requested:
         warnings.append(
-            f"{requested} states were asked for, the data support {fit.n_states}: "
-            f"the others' amplitude is zero; ask for fewer (--states {fit.n_states}) or take more "
-            "light"
+            Undetermined(
+                "states-unsupported",
+                "{requested} states were asked for, the data support {supported}: the others' "
+                "amplitude is zero; ask for fewer (--states {supported}) or take more light",
+                requested=requested,
+                supported=fit.n_states,
+            )
         )
     is_exponential = diagnostics.law == EXPONENTIALS
     if not is_exponential or diagnostics.is_another_better:
@@ -386,10 +421,9 @@ def warnings_about(
     if not is_rounding and diagnostics.law != RATE_SPECTRUM:
         law = diagnostics.chosen_law
         judged = (data, joint) if law is None else (diagnostics.data, law.joint)
-        number = "1 exponential does" if fit.n_states == 1 else f"{fit.n_states} exponentials do"
         warnings += misfit_warnings(
-            _misfit(*judged, diagnostics, bent),
-            number if is_exponential else f"{LAW_LABELS[diagnostics.law]} does",
+            _residuals(*judged, diagnostics, bent),
+            _exponentials(fit.n_states) if is_exponential else LAW_LABELS[diagnostics.law],
             f"{_advice(fit, diagnostics)}; check background and times (labrig fit decay --offset, "
             "--origin, --from)",
         )
@@ -400,9 +434,14 @@ def warnings_about(
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     if correlation is not None and correlation.is_reported and not is_rounding:
         warnings.append(
-            f"the noise of neighbouring values correlates (by {correlation.correlation:.1f}): σ "
-            f"allows for it, it is up to {correlation.factor:.2g} times as large as for "
-            "independent values; find what drifts, or measure a steady light beside the sample"
+            Disturbance(
+                "noise-correlated",
+                "the noise of neighbouring values correlates (by {correlation:.1f}): σ allows for "
+                "it, it is up to {factor:.2g} times as large as for independent values; find what "
+                "drifts, or measure a steady light beside the sample",
+                correlation=correlation.correlation,
+                factor=correlation.factor,
+            )
         )
     if not is_exponential:
         return warnings
@@ -433,12 +472,20 @@ def _advice(fit: StatesFit, diagnostics: FitDiagnostics) -> str:
     return "no other law describes it clearly better"
 
 
-def _hidden_warning(hidden: HiddenState, n_states: int, span_s: float) -> str:
+def _exponentials(n_states: int) -> str:
+    return f"{n_states} exponential{'s' if n_states > 1 else ''}"
+
+
+def _hidden_warning(hidden: HiddenState, n_states: int, span_s: float) -> ResultWarning:
     lifetime_s = hidden.lifetime * span_s
-    return (
-        f"a state {n_states + 1} of about {100 * hidden.share:.0f} % with a lifetime around "
-        f"{lifetime_s:.2g} s may hide in the first frames, which do not tell it; σ allows for it: "
-        f"take {recommended_sampling(lifetime_s)}"
+    return Undetermined(
+        "state-hidden",
+        "a state {state} of about {share_percent:.0f} % with a lifetime around {lifetime_s:.2g} s "
+        "may hide in the first frames, which do not resolve it; σ allows for it: take {sampling}",
+        state=n_states + 1,
+        share_percent=100 * hidden.share,
+        lifetime_s=lifetime_s,
+        sampling=recommended_sampling(lifetime_s),
     )
 
 
@@ -453,23 +500,36 @@ def _common_signal(
     return common, information
 
 
-def _law_warning(fit: StatesFit, diagnostics: FitDiagnostics) -> str:
-    """Return what it means for the rates that another law describes the decay."""
+def _law_warning(fit: StatesFit, diagnostics: FitDiagnostics) -> ResultWarning:
+    """Return the warning about rates of a decay that another law describes."""
     laws = diagnostics.other_laws
     law = next((law for law in laws if law.name == diagnostics.law), laws[0])
     gain = diagnostics.exponentials_bic - law.bic
-    number = f"{fit.n_states} exponential{'s' if fit.n_states > 1 else ''}"
-    how = f"better than {number} (ΔBIC {rounded(gain, 2)})" if gain > 0 else f"beside {number}"
-    return (
-        f"{LAW_LABELS[law.name]} ({law.formula}) describes this decay {how}: the rates are "
-        "descriptive only, do not extrapolate them beyond the times recorded"
+    if gain <= 0:
+        return Misfit(
+            "rates-descriptive",
+            "{law} ({formula}) describes this decay beside {exponentials}: the rates are "
+            "descriptive only, do not extrapolate them beyond the times recorded",
+            law=LAW_LABELS[law.name],
+            formula=law.formula,
+            exponentials=_exponentials(fit.n_states),
+            delta_bic=gain,
+        )
+    return Misfit(
+        "rates-descriptive",
+        "{law} ({formula}) describes this decay better than {exponentials} (ΔBIC {delta_bic:2r}): "
+        "the rates are descriptive only, do not extrapolate them beyond the times recorded",
+        law=LAW_LABELS[law.name],
+        formula=law.formula,
+        exponentials=_exponentials(fit.n_states),
+        delta_bic=gain,
     )
 
 
-def _misfit(
+def _residuals(
     data: WhitenedSeries, joint: JointFit, diagnostics: FitDiagnostics, bent: Bend | None
-) -> Misfit:
-    """Return the residuals to test; an evident bend of the sensor is not told twice."""
+) -> FitResiduals:
+    """Return the residuals to test; those of an evident bend of the sensor are left out."""
     series = data.series
     frames, squared_snr = joint.frame_residuals(data)
     n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
@@ -478,7 +538,7 @@ def _misfit(
     colour_chi2 = max(float(residuals @ residuals - frames @ frames), 0.0)
     if bent is not None and bent.is_evident:
         colour_chi2 = bent.rest_chi2
-    return Misfit(
+    return FitResiduals(
         t_s=series.t_s,
         frames=frames,
         frame_dof=n_frames - along,

@@ -25,6 +25,7 @@ from labrig.fit.profile_likelihood import (
     parameter,
 )
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.result_warning import ResultWarning, Undetermined
 from labrig.material import DECAY_LAWS
 from labrig.results import EXPONENTIALS, ProfileInterval
 
@@ -51,7 +52,7 @@ def decay_intervals(
     covariance: FloatArray,
     laws: Iterable[LawFit],
     diagnostics: FitDiagnostics,
-) -> tuple[dict[str, ProfileInterval], list[str]]:
+) -> tuple[dict[str, ProfileInterval], list[ResultWarning]]:
     """Return the intervals of a decay's states and its law, and warnings about them.
 
     Parameters
@@ -79,9 +80,13 @@ def decay_intervals(
         for law in laws
         if law.fitted.name == diagnostics.law
     ]
-    warnings = [
-        f"along the profile of {' and '.join(part.without)} χ² falls below that of the fit, which "
-        "did not end at the lowest minimum: ask for fewer states (--states) or record longer"
+    warnings: list[ResultWarning] = [
+        Undetermined(
+            "minimum-not-lowest",
+            "along the profile of {parameters} χ² falls below that of the fit, which did not end "
+            "at the lowest minimum: ask for fewer states (--states) or record longer",
+            parameters=part.without,
+        )
         for part in each
         if part.without
     ]

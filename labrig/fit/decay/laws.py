@@ -41,7 +41,7 @@ from labrig.fit.nonlinear_least_squares import parameter_covariance
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import STRONG_EVIDENCE_DELTA_BIC
 from labrig.foundation.errors import FitError
-from labrig.foundation.number_format import rounded
+from labrig.foundation.result_warning import Misfit, ResultWarning
 from labrig.material import DECAY_LAWS, DecayLaw
 from labrig.results import (
     EXPONENTIALS,
@@ -594,8 +594,8 @@ DARKNESS = 1e-4
 SPREAD_MATTERS = 1 / 3
 
 
-def tie_warnings(fit: FittedDecay) -> list[str]:
-    """Return a warning if laws that the data do not tell from the one taken predict otherwise."""
+def tie_warnings(fit: FittedDecay) -> list[ResultWarning]:
+    """Return a warning if laws that are as good as the one taken predict another signal."""
     compared = {law.name: law for law in fit.compared_laws}
     taken = compared.pop(fit.law)
     ties = [
@@ -607,9 +607,17 @@ def tie_warnings(fit: FittedDecay) -> list[str]:
     signals = [_signal(fit, law.name)[0] for law in (taken, *ties)]
     lowest = max(min(signals), np.finfo(float).tiny)
     return [
-        f"the data do not tell {_name(fit, taken)} from {_names(fit, ties)} (ΔBIC below "
-        f"{STRONG_EVIDENCE_DELTA_BIC:.0f}): at {at_s:.3g} s they differ by a factor of "
-        f"{rounded(max(signals) / lowest, 2)}; record longer, or take more light at first"
+        Misfit(
+            "laws-tied",
+            "the data do not distinguish {law} from {others} (ΔBIC below {delta_bic:.0f}): at "
+            "{at_s:.3g} s they differ by a factor of {factor:2r}; record longer, or take more "
+            "light at first",
+            law=_name(fit, taken),
+            others=_names(fit, ties),
+            delta_bic=STRONG_EVIDENCE_DELTA_BIC,
+            at_s=at_s,
+            factor=max(signals) / lowest,
+        )
     ]
 
 

@@ -22,6 +22,7 @@ from labrig.fit.nonlinear_least_squares import LeastSquaresFit, least_squares
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares
+from labrig.foundation.result_warning import Contradiction, ResultWarning, Undetermined
 from labrig.material import exponential_means, exponential_means_and_slopes
 from labrig.results import (
     Candidate,
@@ -458,9 +459,9 @@ def _result(fit: _Fit, candidates: tuple[Candidate, ...], equal_weights: bool) -
     )
 
 
-def _warnings(fit: _Fit) -> list[str]:
-    """Return what is doubtful."""
-    warnings = []
+def _warnings(fit: _Fit) -> list[ResultWarning]:
+    """Return warnings about rates that differ between the tables or are unresolved."""
+    warnings: list[ResultWarning] = []
     alone = 0.0
     for table in fit.problem.tables:
         own = replace(fit.problem, tables=(table,)).fit_from(fit.log_rates)
@@ -469,11 +470,22 @@ def _warnings(fit: _Fit) -> list[str]:
     p_value = float(chdtrc(added, max(fit.chi2 - alone, 0.0) / max(fit.chi2 / fit.dof, 1.0)))
     if p_value < DIFFERENT_LEVEL:
         warnings.append(
-            f"the tables do not have the same rates (p = {p_value:.1g}): fitted one by one, they "
-            "differ by more than σ allows; fit each without --share"
+            Contradiction(
+                "rates-not-shared",
+                "the tables do not have the same rates (p = {p_value:.1g}): fitted one by one, "
+                "they differ by more than σ allows; fit each without --share",
+                p_value=p_value,
+            )
         )
-    known = fit.solution.sigma[: fit.n_states]
+    sigma = fit.solution.sigma[: fit.n_states]
     for number, i in enumerate(np.argsort(-fit.log_rates), start=1):
-        if known[i] > ILL_DETERMINED:
-            warnings.append(f"k{number} is known to {100 * known[i]:.0f} % only: ask for one less")
+        if sigma[i] > ILL_DETERMINED:
+            warnings.append(
+                Undetermined(
+                    "rate-unresolved",
+                    "k{state} is determined to {sigma_percent:.0f} % only: ask for one less",
+                    state=number,
+                    sigma_percent=100 * sigma[i],
+                )
+            )
     return warnings

@@ -31,7 +31,7 @@ from labrig.fit.nonlinear_least_squares import (
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.foundation.nonnegative import nonnegative_least_squares
-from labrig.foundation.number_format import rounded
+from labrig.foundation.result_warning import Disturbance, Misfit, ResultWarning, Undetermined
 from labrig.results import (
     BandTests,
     ChargingSeries,
@@ -295,7 +295,7 @@ def _result(
     solution: LeastSquaresFit,
     reference: int,
     uncertain: RelativeSigmas,
-    law_warnings: Sequence[str],
+    law_warnings: Sequence[ResultWarning],
     intervals: IntervalChoice,
     site_sizes: tuple[float, ...] = (),
 ) -> FittedExcitation:
@@ -458,87 +458,143 @@ def _at_off(
 
 def _warnings(
     problem: ExcitationProblem, solution: LeastSquaresFit, states: Sequence[ExcitedState]
-) -> list[str]:
-    messages = []
+) -> list[ResultWarning]:
+    warnings: list[ResultWarning] = []
     if solution.creeps:
-        messages.append("the fit still creeps: rates and levels may trade off; charge for longer")
+        warnings.append(
+            Undetermined(
+                "fit-unconverged",
+                "the fit has not converged: rates and levels may trade off; charge for longer",
+            )
+        )
     elif solution.ending is Ending.RANK_DEFICIENT:
-        messages.append(
-            "the charges do not determine every rate and level: those have no finite σ; charge for "
-            "several durations, shorter and longer ones"
+        warnings.append(
+            Undetermined(
+                "parameters-undetermined",
+                "the charges do not determine every rate and level: those have no finite σ; charge "
+                "for several durations, shorter and longer ones",
+            )
         )
     worst = max(state.amplitude_sigma / max(state.amplitude, 1e-300) for state in states)
-    if worst > LEVEL_KNOWN:
-        known = f"known to {100 * worst:.0f} % only, as are" if worst < 1 else "not known, nor are"
-        messages.append(
-            f"how far the sample was charged is {known} Λ and r(0): charge for longer or with more "
-            "light, so that the glow stops growing"
+    if LEVEL_KNOWN < worst < 1:
+        warnings.append(
+            Undetermined(
+                "charge-unsaturated",
+                "the fraction to which the sample was charged is determined to {sigma_percent:.0f} "
+                "% only, as are Λ and r(0): charge for longer or with more light, so that the glow "
+                "stops growing",
+                sigma_percent=100 * worst,
+            )
         )
-    reduced = solution.chi2 / max(problem.n_values - solution.rank, 1)
-    if reduced > LARGE_CHI2:
-        messages.append(
-            f"reduced χ² is {reduced:.2g}: the rate equation or the noise is not as assumed; look "
-            "at the residuals of each charge"
+    elif worst >= 1:
+        warnings.append(
+            Undetermined(
+                "charge-unsaturated",
+                "the fraction to which the sample was charged is not determined, nor are Λ and "
+                "r(0): charge for longer or with more light, so that the glow stops growing",
+                sigma_percent=100 * worst,
+            )
         )
-    return messages
+    reduced_chi2 = solution.chi2 / max(problem.n_values - solution.rank, 1)
+    if reduced_chi2 > LARGE_CHI2:
+        warnings.append(
+            Misfit(
+                "model-misfit",
+                "reduced χ² is {reduced_chi2:.2g}: the rate equation or the noise is not as "
+                "assumed; look at the residuals of each charge",
+                reduced_chi2=reduced_chi2,
+            )
+        )
+    return warnings
 
 
-def _band_warnings(tests: BandTests) -> list[str]:
-    """Return a line for each quantity of the glow that depends on the exciting band."""
-    messages = []
+def _band_warnings(tests: BandTests) -> list[ResultWarning]:
+    """Return a warning for each quantity of the glow that depends on the exciting band."""
+    warnings: list[ResultWarning] = []
     variance = tests.light_variance
     if tests.is_thick:
-        messages.append(
-            f"light that is absorbed most saturates the glow sooner than other light "
-            f"({variance.value / variance.sigma:.1f} σ), as in a layer of optical density "
-            f"{rounded(tests.optical_density, 2)} or more: Λ is too small, and k_e is a mean "
-            "over the depth; measure a thinner layer"
+        warnings.append(
+            Misfit(
+                "layer-thick",
+                "light that is absorbed most saturates the glow sooner than other light "
+                "({sigmas:.1f} σ), as in a layer of optical density {optical_density:2r} or more: "
+                "Λ is too small, and k_e is a mean over the depth; measure a thinner layer",
+                sigmas=variance.value / variance.sigma,
+                optical_density=tests.optical_density,
+            )
         )
     elif tests.amplitude.differs:
-        messages.append(
-            "the glow of the fully charged sample depends on the exciting band (p = "
-            f"{tests.amplitude.p_value:.1g}): the layer is thick, or some light empties traps; "
-            "Λ and r(0) are not to be trusted"
+        warnings.append(
+            Misfit(
+                "amplitude-by-band",
+                "the glow of the fully charged sample depends on the exciting band (p = "
+                "{p_value:.1g}): the layer is thick, or some light empties traps; Λ and r(0) are "
+                "not to be trusted",
+                p_value=tests.amplitude.p_value,
+            )
         )
     if tests.rate.differs:
-        messages.append(
-            "the decay depends on the exciting band (p = "
-            f"{tests.rate.p_value:.1g}): states are missing, another law holds, or stray light "
-            "empties traps; look at the rates by band"
+        warnings.append(
+            Misfit(
+                "decay-by-band",
+                "the decay depends on the exciting band (p = {p_value:.1g}): states are missing, "
+                "another law holds, or stray light empties traps; look at the rates by band",
+                p_value=tests.rate.p_value,
+            )
         )
     if tests.hue is not None and tests.hue.differs:
-        messages.append(
-            f"the hue of the glow depends on the exciting band (p = {tests.hue.p_value:.1g}): "
-            "states of different spectra are excited differently, or light of something else is "
-            "in the photographs; look at the channels by band"
+        warnings.append(
+            Misfit(
+                "hue-by-band",
+                "the hue of the glow depends on the exciting band (p = {p_value:.1g}): states of "
+                "different spectra are excited differently, or light of something else is in the "
+                "photographs; look at the channels by band",
+                p_value=tests.hue.p_value,
+            )
         )
-    return messages
+    return warnings
 
 
-def _linearity_warnings(missing: Measured) -> list[str]:
-    """Return one line if large signals fall short of proportion."""
+def _linearity_warnings(missing: Measured) -> list[ResultWarning]:
+    """Return a warning if large signals fall short of proportion."""
     if missing.value < CLEARLY_MISSING * missing.sigma:
         return []
     return [
-        f"large signals fall short of proportion, the largest by {100 * missing.value:.1f} % "
-        f"({missing.value / missing.sigma:.1f} σ): the camera is not linear, and k_r and k_e may "
-        "be off by as much; leave out the brightest photographs (labrig process --exclude)"
+        Disturbance(
+            "sensor-nonlinear",
+            "large signals fall short of proportion, the largest by {missing_percent:.1f} % "
+            "({sigmas:.1f} σ): the camera is not linear, and k_r and k_e may be off by as much; "
+            "leave out the brightest photographs (labrig process --exclude)",
+            missing_percent=100 * missing.value,
+            sigmas=missing.value / missing.sigma,
+        )
     ]
 
 
-def _law_warnings(problem: ExcitationProblem, theta: FloatArray) -> list[str]:
-    """Return one line if charges of different lengths do not follow the rate equation."""
+def _law_warnings(problem: ExcitationProblem, theta: FloatArray) -> list[ResultWarning]:
+    """Return a warning if charges of different lengths do not follow the rate equation."""
     rates = problem.parameters.unpack(theta)
     test = law_test(problem.parameters, rates, theta, problem.series)
     if test is None or not test.fails:
         return []
-    long_ones, short_ones, cause = (
-        ("more", "less", "charging is convex, the layer is thick")
-        if test.trend > 0
-        else ("less", "more", "states are missing, the lamp's light empties traps")
-    )
+    if test.trend > 0:
+        return [
+            Misfit(
+                "rate-equation-misfit",
+                "long charges glow more and short ones less than by the rate equation "
+                "({sigmas:.1f} σ of the lamp's scatter): charging is convex, the layer is thick, "
+                "or another law holds; k_e, Λ and r(0) are not to be trusted",
+                sigmas=abs(test.trend),
+                trend=test.trend,
+            )
+        ]
     return [
-        f"long charges glow {long_ones} and short ones {short_ones} than the rate equation says "
-        f"({abs(test.trend):.1f} σ of the lamp's scatter): {cause}, or another law holds; k_e, Λ "
-        "and r(0) are not to be trusted"
+        Misfit(
+            "rate-equation-misfit",
+            "long charges glow less and short ones more than by the rate equation ({sigmas:.1f} σ "
+            "of the lamp's scatter): states are missing, the lamp's light empties traps, or "
+            "another law holds; k_e, Λ and r(0) are not to be trusted",
+            sigmas=abs(test.trend),
+            trend=test.trend,
+        )
     ]

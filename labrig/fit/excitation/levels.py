@@ -127,11 +127,10 @@ def levels(
     order
         Kinetic orders (N,); None: all are 1, and no derivative by them is wanted.
     """
+    if (places := series.places) > 1:
+        return levels(series.spread(), k_r_per_s, k_e_per_s, order).meaned(places)
     if series.arriving is not None:
         return mean_levels([levels(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()])
-    if series.across is not None:
-        spread_levels = levels(series.spread(), k_r_per_s, k_e_per_s, order)
-        return spread_levels.meaned(len(series.across))
     after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s, order)
     return _photographed(series, after_charges, k_r_per_s, order)
 
@@ -154,14 +153,13 @@ def levels_and_slopes(
     """
     # Of first order the light of parts is that of their mean concentration, of other orders it is
     # not.
+    if order is not None and (places := series.places) > 1:
+        level, by_light, by_start = levels_and_slopes(series.spread(), k_r_per_s, k_e_per_s, order)
+        return level.meaned(places), _meaned(by_light, 2, places), _meaned(by_start, 1, places)
     if order is not None and series.arriving is not None:
         each = [levels_and_slopes(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()]
         of_levels, lights, starts = zip(*each, strict=True)
         return mean_levels(of_levels), _mean(lights), _mean(starts)
-    if order is not None and series.across is not None:
-        places = len(series.across)
-        level, by_light, by_start = levels_and_slopes(series.spread(), k_r_per_s, k_e_per_s, order)
-        return level.meaned(places), _meaned(by_light, 2, places), _meaned(by_start, 1, places)
     after, by_each, by_start = _left_by_charges(series, k_r_per_s, k_e_per_s, order)
     level = _photographed(series, after, k_r_per_s, order)
     of_charge, by_after = _charge_of_shots(series, len(after.value)), level.by_before
@@ -177,14 +175,13 @@ def _left_by_charges(
     `levels_and_slopes`, shape (K, K, P, N, B) and (K, P, N); `by_before` is 1, so that of a
     photograph it is that by what its charge has left.
     """
+    if (places := series.places) > 1:
+        after, by_light, by_begin = _left_by_charges(series.spread(), k_r_per_s, k_e_per_s, order)
+        return after.meaned(places), _meaned(by_light, 2, places), _meaned(by_begin, 1, places)
     if series.arriving is not None:
         each = [_left_by_charges(one, k_r_per_s, k_e_per_s, order) for one in series.at_depths()]
         of_levels, of_light, of_start = zip(*each, strict=True)
         return mean_levels(of_levels), _mean(of_light), _mean(of_start)
-    if series.across is not None:
-        places = len(series.across)
-        after, by_light, by_begin = _left_by_charges(series.spread(), k_r_per_s, k_e_per_s, order)
-        return after.meaned(places), _meaned(by_light, 2, places), _meaned(by_begin, 1, places)
     after = _levels_after_charges(series, k_r_per_s, k_e_per_s, order)
     charges = len(after.value)
     # By all light until then, by that of each charge, and by the start, before every charge.

@@ -4,6 +4,7 @@ import numpy as np
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import Contradiction, ResultWarning
 from labrig.material.reradiation.matrix import ReradiationMatrix
 
 #: Radiance factors at 45°/0° are no energies: of 97 measured surfaces the brightest has 1.07.
@@ -14,8 +15,8 @@ LOWEST_REFLECTANCE = -0.02
 SIGMAS = 3.0
 
 
-def physical_warnings(matrix: ReradiationMatrix) -> tuple[str, ...]:
-    """Return what is unusual in a matrix, and refuse what cannot be.
+def physical_warnings(matrix: ReradiationMatrix) -> tuple[ResultWarning, ...]:
+    """Return warnings about a matrix that is unusual, and refuse one that cannot be.
 
     Parameters
     ----------
@@ -24,10 +25,9 @@ def physical_warnings(matrix: ReradiationMatrix) -> tuple[str, ...]:
 
     Returns
     -------
-    tuple of str
-        A line for an input band of which more than all light comes back, reflected and re-radiated:
-        as a radiance factor this can be, and the largest of the 97 surfaces measured for it is
-        1.07.
+    tuple of ResultWarning
+        A warning if more than all light of an input band comes back, reflected and re-radiated: as
+        a radiance factor this can be, and the largest of the 97 surfaces measured for it is 1.07.
 
     Raises
     ------
@@ -41,8 +41,8 @@ def physical_warnings(matrix: ReradiationMatrix) -> tuple[str, ...]:
     >>> nm = np.arange(400.0, 701.0, 10.0)
     >>> values = np.diag(np.full(31, 0.9))
     >>> values[20, 5] = 0.15
-    >>> physical_warnings(ReradiationMatrix.from_bands("paper", nm, nm, values))
-    ("1.050 of the light at 450 nm comes back from 'paper', more than from a perfect white",)
+    >>> print(*physical_warnings(ReradiationMatrix.from_bands("paper", nm, nm, values)))
+    1.050 of the light at 450 nm comes back from 'paper', more than from a perfect white
     """
     _refuse_negative(matrix)
     if matrix.unit == "relative":
@@ -60,8 +60,14 @@ def physical_warnings(matrix: ReradiationMatrix) -> tuple[str, ...]:
     if fraction[brightest] <= UNUSUAL_FRACTION:
         return ()
     return (
-        f"{fraction[brightest]:.3f} of the light at {matrix.input_nm[brightest]:g} nm comes back "
-        f"from {matrix.name!r}, more than from a perfect white",
+        Contradiction(
+            "more-than-white",
+            "{fraction:.3f} of the light at {input_nm:g} nm comes back from {material!r}, more "
+            "than from a perfect white",
+            fraction=fraction[brightest],
+            input_nm=matrix.input_nm[brightest],
+            material=matrix.name,
+        ),
     )
 
 

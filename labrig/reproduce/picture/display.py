@@ -19,7 +19,9 @@ from labrig.optics import (
     XYZ_TO_SRGB,
     CameraResponse,
     band_integrals,
+    from_oklab,
     observer,
+    oklab,
     photopic_efficacy,
     srgb_bytes,
 )
@@ -34,6 +36,10 @@ UNCLIPPED_PER_CENT = 99.5
 BRADFORD = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
+
+_WHITE_LAB = np.array([1.0, 0.0, 0.0])
+#: How many times brighter than the screen a colour is, less one, where it is half white.
+HALF_WHITE = 8.0
 
 
 def tristimulus(radiance: ArrayLike, edges_nm: ArrayLike) -> FloatArray:
@@ -142,9 +148,11 @@ class Display:
     """Transform from X, Y, Z to 8-bit sRGB, the same for all pixels.
 
     X, Y, Z are divided by the luminance of the screen's white, and become linear sRGB. D65 is
-    white; another white is adapted to it by Bradford's transform. A colour outside of the screen's
-    gamut is mixed with the grey of its own luminance until it fits, so that its luminance stays;
-    brighter than white is white. The curve is that of IEC 61966-2-1.
+    white; another white is adapted to it by Bradford's transform. A colour that no screen shows, as
+    it is more saturated, is mixed with the grey of its own luminance until it fits. One that is
+    brighter than the screen keeps its hue: it has the brightest colour of its chromaticity, and
+    turns to white of the same hue (in Oklab) where it is many times brighter. The curve is that of
+    IEC 61966-2-1.
 
     Parameters
     ----------
@@ -167,6 +175,8 @@ class Display:
     >>> grey, outside_of_the_gamut = [37.95, 40.0, 43.4], [0.0, 8.0, 0.0]
     >>> display.shown(np.array([grey, outside_of_the_gamut])).tolist()
     [[187, 188, 187], [0, 103, 65]]
+    >>> display.shown(np.array([20.0, 40.0, 200.0])).tolist()  # a blue light
+    [19, 194, 255]
     """
 
     white_luminance: float
@@ -237,17 +247,21 @@ class Display:
             white = f"x, y = {x:.4f}, {y:.4f} (by Bradford's transform)"
         return (
             f"sRGB (IEC 61966-2-1), {white} of luminance {rounded(self.white_luminance, 4)} is "
-            "white; colours out of gamut are mixed with the grey of their luminance"
+            "white; colours out of gamut are mixed with the grey of their luminance, brighter ones "
+            "keep their hue"
         )
 
     def linear(self, xyz: FloatArray) -> FloatArray:
         """Return linear sRGB from 0 to 1 of X, Y, Z (…, 3)."""
         relative = _adapted(np.asarray(xyz, dtype=np.float64), self.adapted_white) * self.exposure
         lifted = _lifted(relative)
-        grey = np.clip(relative[..., 1:2], 0.0, 1.0)
-        above = lifted.max(axis=-1, keepdims=True) - grey
-        kept = _ratio_up_to_one(1.0 - grey, above)
-        return np.asarray(np.clip(grey + kept * (lifted - grey), 0.0, 1.0))
+        over = np.maximum(lifted.max(axis=-1, keepdims=True), 1.0)
+        fitted = lifted / over
+        is_over = over[..., 0] > 1
+        lab = oklab(fitted[is_over])
+        lab += _whitened(over[is_over]) * (_WHITE_LAB - lab)
+        fitted[is_over] = from_oklab(lab)
+        return np.asarray(np.clip(fitted, 0.0, 1.0))
 
     def shown(self, xyz: FloatArray) -> Bytes:
         """Return the bytes of sRGB of X, Y, Z (…, 3)."""
@@ -279,6 +293,11 @@ def _lifted(xyz: FloatArray) -> FloatArray:
     below = grey - linear.min(axis=-1, keepdims=True)
     kept = _ratio_up_to_one(grey, below)
     return np.asarray(grey + kept * (linear - grey))
+
+
+def _whitened(over: FloatArray) -> FloatArray:
+    """Return the part of white in a colour so many times brighter than the screen's."""
+    return (over - 1) / (over - 1 + HALF_WHITE)
 
 
 def _ratio_up_to_one(part: FloatArray, whole: FloatArray) -> FloatArray:

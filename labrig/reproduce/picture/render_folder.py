@@ -93,7 +93,7 @@ class RenderFolder:
         make_folder(path)
         described = {
             "identity": identity,
-            "notes": scene.notes,
+            "notes": [note.to_dict() for note in scene.notes],
             "scene": scene.file.model_dump(mode="json", exclude_defaults=True),
         }
         write_text(content, json.dumps(described, indent=1, ensure_ascii=False))

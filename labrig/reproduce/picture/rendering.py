@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from labrig.foundation.arrays import Float32Array, FloatArray, Int32Array
 from labrig.foundation.errors import UsageError
 from labrig.foundation.processors import n_processors
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.reproduce.picture.view import Report, View, require_memory
 from labrig.reproduce.scene.built_scene import Scene
 from labrig.reproduce.surface.field import Field
@@ -145,13 +146,17 @@ class Frame:
     escaped_share: float = 0.0
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What may be wrong with the picture, one sentence each."""
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Warnings about the picture."""
         if self.escaped_share <= MAX_ESCAPED:
             return ()
         return (
-            f"{self.escaped_share:.2%} of the rays left the closed room between its triangles and "
-            "were traced again, so light near its edges may be wrong; join the vertices there",
+            Disturbance(
+                "rays-escaped",
+                "{escaped_share:.2%} of the rays left the closed room between its triangles and "
+                "were traced again, so light near its edges may be wrong; join the vertices there",
+                escaped_share=self.escaped_share,
+            ),
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import beside
+from labrig.foundation.result_warning import ResultWarning
 from labrig.foundation.yaml_file import did_you_mean, validate
 from labrig.material import Albedo, Material, read_any_material, read_mixture
 from labrig.optics import (
@@ -235,13 +236,13 @@ class Scene:
     _folder: Path = field(repr=False)
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What was assumed or is missing, one sentence each, after the names of the materials."""
-        of: dict[str, list[str]] = {}
+    def notes(self) -> tuple[ResultWarning, ...]:
+        """Warnings about values that were assumed or are missing, about the named materials."""
+        of: dict[ResultWarning, list[str]] = {}
         for material in self.materials:
             for note in material.notes:
                 of.setdefault(note, []).append(material.name)
-        return tuple(f"{', '.join(names)}: {note}" for note, names in of.items())
+        return tuple(note.about(", ".join(names)) for note, names in of.items())
 
     @property
     def is_moving(self) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from labrig.foundation.arrays import Float32Array, FloatArray
 from labrig.foundation.errors import UsageError
+from labrig.foundation.result_warning import Contradiction, ResultWarning, Unmeasured
 from labrig.material import (
     Albedo,
     Material,
@@ -64,7 +65,7 @@ class SurfaceMaterial:
         Parameters of the glow in the scene's units, of each texel of `texture` where they differ;
         None of a material that does not glow.
     notes
-        What was assumed or is missing, one sentence each.
+        Warnings about values that were assumed or are missing.
     texture
         Parameters that differ from place to place; None where all are the same.
     """
@@ -72,7 +73,7 @@ class SurfaceMaterial:
     name: str
     matrix: Float32Array
     parameters: FieldParameters | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[ResultWarning, ...] = ()
     texture: ParameterTexture | None = None
 
     @property
@@ -82,7 +83,10 @@ class SurfaceMaterial:
 
 
 def of_albedo(
-    name: str, albedo: Albedo | Transmittance | float, bands: Bands, notes: tuple[str, ...] = ()
+    name: str,
+    albedo: Albedo | Transmittance | float,
+    bands: Bands,
+    notes: tuple[ResultWarning, ...] = (),
 ) -> SurfaceMaterial:
     """Return a surface that reflects and does nothing else.
 
@@ -96,7 +100,7 @@ def of_albedo(
     bands
         Bands of the rendering.
     notes
-        What was assumed.
+        Warnings about values that were assumed.
 
     Returns
     -------
@@ -239,16 +243,22 @@ def _fluorescent(
     )
 
 
-def _negative_notes(reradiated: FloatArray, bands: Bands) -> tuple[str, ...]:
-    """Return a note on re-radiation that takes light away instead of giving it back."""
+def _negative_notes(reradiated: FloatArray, bands: Bands) -> tuple[ResultWarning, ...]:
+    """Return a warning about re-radiation that takes light away instead of giving it back."""
     out, into = np.unravel_index(int(np.argmin(reradiated)), reradiated.shape)
     lowest = float(reradiated[out, into])
     if lowest >= -TOLD_NEGATIVE:
         return ()
     return (
-        f"noise of its matrix takes up to {-lowest:.1%} of light away instead of re-radiating it "
-        f"(at {bands.centre_nm[out]:g} nm, of light at {bands.centre_nm[into]:g} nm); a mixture "
-        "(labrig fit mixture) does not",
+        Contradiction(
+            "reradiation-negative",
+            "noise of its matrix takes up to {fraction:.1%} of light away instead of re-radiating "
+            "it (at {output_nm:g} nm, of light at {input_nm:g} nm); a mixture (labrig fit mixture) "
+            "does not",
+            fraction=-lowest,
+            output_nm=bands.centre_nm[out],
+            input_nm=bands.centre_nm[into],
+        ),
     )
 
 
@@ -304,8 +314,8 @@ def of_phosphor(
     >>> from labrig.reproduce import Bands, BenchLight, of_phosphor
     >>> bench = BenchLight(absolute_irradiance(1000.0, read_light("A")))
     >>> paint = of_phosphor(read_material("blue-paint"), Bands.even(), bench, 0.7, 1.0)
-    >>> paint.notes[0]
-    'its albedo is assumed to be 0.7 at all wavelengths'
+    >>> print(paint.notes[0])
+    its albedo is assumed to be 0.7 at all wavelengths
     """
     rates = FieldParameters.of(material, prompt)
     if texture is not None:
@@ -314,14 +324,20 @@ def of_phosphor(
     edges = material.bands_nm
     _require_overlap(material.name, edges, bands)
     overlap = bands.overlap_nm(edges)
-    notes = []
+    notes: list[ResultWarning] = []
     if (surface := material.albedo or albedo) is None:
         raise UsageError(
             f"{material.name}: its file has no albedo, so the light that it reflects is not known; "
             "measure it (labrig run reflectance) or assume one (--assume-albedo 0.8)"
         )
     if material.albedo is None:
-        notes.append(f"its albedo is assumed to be {albedo:g} at all wavelengths")
+        notes.append(
+            Unmeasured(
+                "albedo-assumed",
+                "its albedo is assumed to be {albedo:g} at all wavelengths",
+                albedo=albedo,
+            )
+        )
     factor = 1.0 if material.scale == "absolute" else bench.mean(edges)
     if material.scale is None:
         if reradiation_scale is None:
@@ -332,10 +348,18 @@ def of_phosphor(
             )
         factor *= reradiation_scale
         notes.append(
-            f"the scale of its glow is assumed to be {reradiation_scale:g} s/sr for a Λ of 1"
+            Unmeasured(
+                "scale-assumed",
+                "the scale of its glow is assumed to be {scale_s_per_sr:g} s/sr for a Λ of 1",
+                scale_s_per_sr=reradiation_scale,
+            )
         )
     if not rates.k_e_per_s.any():
-        notes.append("it has no excitation rates, so light does not charge it")
+        notes.append(
+            Unmeasured(
+                "no-excitation-rates", "it has no excitation rates, so light does not charge it"
+            )
+        )
     k_e = rates.k_e_per_s.astype(np.float64)
     if material.irradiance_norm is not None:
         k_e *= material.irradiance_norm.value / bench.vector_length(edges)

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.foundation.errors import UsageError
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 
 _HOUR_S, _HALF_DAY_S, _DAY_S = 3600, 43200, 86400
 #: Rows before and after a jump whose spacing proves it, and the fewest of them.
@@ -76,7 +77,7 @@ class Clock:
     is_absolute: bool
     could_be_12_hour: bool
     form: str = ""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
 
 
 def continuous(clock: Clock) -> Clock:
@@ -125,31 +126,51 @@ def _without_summer_time(clock: Clock) -> Clock:
     steps = _steps(clock.ticks)
     hour = _HOUR_S * clock.per_s
     ahead = [row for row, step in enumerate(steps) if _is_regular(clock, steps, row, step - hour)]
-    shift, shifts, warnings = 0, [0], []
+    shift, shifts = 0, [0]
+    warnings: list[ResultWarning] = []
     for row, step in enumerate(steps):
-        from_to = (
-            f"line {clock.lines[row + 1]}: the clock goes {'ahead' if step > 0 else 'back'} from "
-            f"{clock.cells[row].strip()} to {clock.cells[row + 1].strip()}"
-        )
+        line = f"line {clock.lines[row + 1]}"
+        before, after = clock.cells[row].strip(), clock.cells[row + 1].strip()
         is_repeated_hour = step == 0 and clock.has_dates and _is_night_of_change(clock, row + 1)
         if (step < 0 or is_repeated_hour) and _is_regular(clock, steps, row, step + hour):
             shift += hour
             warnings.append(
-                f"{from_to}, by an hour as at the end of summer time: the spacing of the rows "
-                "shows it, and an hour was added from there on"
+                Disturbance(
+                    "summer-time",
+                    "the clock goes back from {before} to {after}, by an hour as at the end of "
+                    "summer time: the spacing of the rows shows it, and an hour was added from "
+                    "there on",
+                    line,
+                    before=before,
+                    after=after,
+                )
             )
         elif step < 0:
-            _refuse_backward(clock, row, from_to)
+            _refuse_backward(clock, row, f"{line}: the clock goes back from {before} to {after}")
         elif row in ahead and _crosses_summer_time(clock, row):
             shift -= hour
             warnings.append(
-                f"{from_to}, by an hour as at the begin of summer time: the spacing of the rows "
-                "shows it, and an hour was taken off from there on"
+                Disturbance(
+                    "summer-time",
+                    "the clock goes ahead from {before} to {after}, by an hour as at the begin of "
+                    "summer time: the spacing of the rows shows it, and an hour was taken off from "
+                    "there on",
+                    line,
+                    before=before,
+                    after=after,
+                )
             )
         elif row in ahead and len(ahead) <= _MAX_JUMPS:
             warnings.append(
-                f"{from_to}, by just an hour more than the rows around it: it is taken for a "
-                "pause; if the clock was set, take the hour off the times that follow"
+                Disturbance(
+                    "clock-jumps",
+                    "the clock goes ahead from {before} to {after}, by just an hour more than the "
+                    "rows around it: it is taken for a pause; if the clock was set, take the hour "
+                    "off the times that follow",
+                    line,
+                    before=before,
+                    after=after,
+                )
             )
         shifts.append(shift)
     ticks = [tick + by for tick, by in zip(clock.ticks, shifts, strict=True)]
@@ -409,7 +430,7 @@ class ClockTimes:
     t_s: npt.NDArray[np.float64]
     form: str
     resolution_s: float
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
 
 def is_clock_form(text: str) -> bool:

@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from labrig.analyse.inputs import AnalysisContext
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Unmeasured
 from labrig.protocols.angular_fluorescence.analysis.sphere import sphere_views
 from labrig.protocols.angular_fluorescence.analysis.yarn import yarn_views
 from labrig.protocols.angular_fluorescence.result import (
@@ -32,25 +34,28 @@ def analyse(context: AnalysisContext) -> AngularFluorescenceResult:
     else:
         yarns, warnings = yarn_views(context)
         result = AngularFluorescenceResult(yarns=yarns)
-    lines = (*warnings, *dict.fromkeys(_warnings(result)))
-    return AngularFluorescenceResult(
-        yarns=result.yarns, spheres=result.spheres, warnings=tuple(lines)
-    )
+    return replace(result, warnings=(*warnings, *dict.fromkeys(_warnings(result))))
 
 
-def _warnings(result: AngularFluorescenceResult) -> Iterator[str]:
+def _warnings(result: AngularFluorescenceResult) -> Iterator[ResultWarning]:
     reradiated = [views for views in result.spheres if views.part == "re-radiated"]
     measured: list[YarnViews | SphereViews] = [*result.yarns, *reradiated]
     for views in measured:
         if math.isnan(views.reflected_at_most):
-            yield (
-                f"{views.led}: how much of the signal in {', '.join(views.channels)} is reflected "
-                "light, which does depend on angle, is unknown; name centre and fwhm of the LED "
-                "and the camera's curves in the rig file"
+            yield Unmeasured(
+                "reflected-light-unknown",
+                "how much of the signal in {channels} is reflected light, which does depend on "
+                "angle, is unknown; name centre and fwhm of the LED and the camera's curves in the "
+                "rig file",
+                subject=views.led,
+                channels=tuple(views.channels),
             )
         if views.reflected_at_most > MUCH_REFLECTED:
-            yield (
-                f"{views.led}: up to {views.reflected_at_most:.0%} of the signal in "
-                f"{', '.join(views.channels)} may be reflected light, which does depend on angle; "
-                "take an LED of a shorter wavelength"
+            yield Disturbance(
+                "reflected-light",
+                "up to {reflected:.0%} of the signal in {channels} may be reflected light, which "
+                "does depend on angle; take an LED of a shorter wavelength",
+                subject=views.led,
+                reflected=views.reflected_at_most,
+                channels=tuple(views.channels),
             )

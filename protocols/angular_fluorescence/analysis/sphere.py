@@ -13,6 +13,7 @@ from labrig.fit.angular import NearLight, SphereImage, fit_shading
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import region_pixels
+from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning, Unmeasured
 from labrig.optics import Flat, rho_squared
 from labrig.protocols.angular_fluorescence.analysis.channels import (
     chosen_channels,
@@ -290,7 +291,7 @@ class View:
     size: tuple[int, int]
 
 
-def sphere_views(context: AnalysisContext) -> tuple[tuple[SphereViews, ...], list[str]]:
+def sphere_views(context: AnalysisContext) -> tuple[tuple[SphereViews, ...], list[ResultWarning]]:
     """Return the views of each LED with their tests, and warnings.
 
     Raises
@@ -302,32 +303,35 @@ def sphere_views(context: AnalysisContext) -> tuple[tuple[SphereViews, ...], lis
     """
     frames = part_frames(context, *AngularFrames)
     require_calibrated_camera(context.inputs[CAMERA_KIND], context.run, frames)
-    views, warnings = [], []
+    views: list[View] = []
+    warnings: list[ResultWarning] = []
     for pose in context.protocol.poses():
         own = [frame for frame in frames if frame.unit == pose.unit]
-        view, warning = _view(context, pose, own)
-        if view is None:
-            warnings.append(f"{pose.unit}: {warning}; the other views are used")
+        view = _view(context, pose, own)
+        if isinstance(view, ResultWarning):
+            warnings.append(view.about(pose.unit))
         else:
             views.append(view)
     lit = {pose.led: pose.part for pose in context.protocol.poses()}
     tested = []
     for led, light_part in lit.items():
         under_led = [view for view in views if view.pose.led == led]
-        sphere, lines = _tested(context, under_led, led, light_part)
+        sphere, of_led = _tested(context, under_led, led, light_part)
         tested.append(sphere)
-        warnings += lines
+        warnings += of_led
     return tuple(tested), warnings
 
 
 def _view(
     context: AnalysisContext, pose: Pose, frames: Sequence[FrameRecord]
-) -> tuple[View | None, str]:
-    """Return a view, or None and why there is none."""
+) -> View | ResultWarning:
+    """Return a view, or a warning of why there is none."""
     on = [frame for frame in frames if frame.role == AngularFrames.VIEW]
     off = [frame for frame in frames if frame.role == AngularFrames.OFF]
     if not on or not off:
-        return None, "missing (go on with labrig resume)"
+        return Unmeasured(
+            "view-missing", "missing (go on with labrig resume); the other views are used"
+        )
     raw = read_raw(on[0].path)
     cell = max(raw.cfa_side, 2)
     region = part_region(context, context.protocol.region)
@@ -335,12 +339,16 @@ def _view(
     left, top = x // cell, y // cell
     window = slice(top, (y + high) // cell), slice(left, (x + wide) // cell)
     if any(saturated_cells(read_raw(frame.path))[window].any() for frame in on):
-        return None, "it clips (lower camera.iso)"
+        return Disturbance("view-clipped", "it clips (lower camera.iso); the other views are used")
     light = _mean(on, window) - _mean(off, window)
     if np.percentile(light.sum(axis=2), 99) < MIN_LIGHT:
-        return None, "dark: the LED did not light, or the sphere was not in the region"
+        return Unmeasured(
+            "view-dark",
+            "dark: the LED did not light, or the sphere was not in the region; the other views are "
+            "used",
+        )
     corner = left * cell, top * cell
-    return View(pose, raw.channels, light, corner, cell, (raw.width, raw.height)), ""
+    return View(pose, raw.channels, light, corner, cell, (raw.width, raw.height))
 
 
 def _mean(frames: Sequence[FrameRecord], window: tuple[slice, slice]) -> FloatArray:
@@ -350,7 +358,7 @@ def _mean(frames: Sequence[FrameRecord], window: tuple[slice, slice]) -> FloatAr
 
 def _tested(
     context: AnalysisContext, views: Sequence[View], led: str, light_part: str
-) -> tuple[SphereViews, list[str]]:
+) -> tuple[SphereViews, list[ResultWarning]]:
     if not views:
         raise DataError(f"{led}: no view is lit and complete; go on with labrig resume")
     channels = views[0].channels
@@ -391,7 +399,7 @@ def _light(context: AnalysisContext) -> NearLight:
 
 def _outlines(
     context: AnalysisContext, views: Sequence[View], chosen: Sequence[int]
-) -> tuple[list[Outline], list[str]]:
+) -> tuple[list[Outline], list[ResultWarning]]:
     """Return the outline of the sphere in each view in pixels, and warnings.
 
     One that the protocol gives is refined by the frames where these show one that is about the
@@ -410,13 +418,25 @@ def _outlines(
     seen = _mean_outline(found)
     away = np.array([x - seen.x, y - seen.y, radius - seen.radius])
     is_same = bool((np.abs(away) <= max(GIVEN_SIGMA_PX, SAME * radius)).all())
-    warnings = []
+    warnings: list[ResultWarning] = []
     if (np.abs(away) > np.maximum(DIFFERENT_SIGMA * seen.sigma, DIFFERENT_PX)).any():
         taken = "that of the frames is taken" if is_same else "the difference is in σ"
         warnings.append(
-            f"circle: expected about the outline that the frames show, centre ({seen.x:.1f}, "
-            f"{seen.y:.1f}) and radius {seen.radius:.1f} px, got centre ({x:.1f}, {y:.1f}) and "
-            f"radius {radius:.1f} px; {taken}: correct it, or leave circle out"
+            Contradiction(
+                "circle-differs",
+                "expected about the outline that the frames show, centre ({seen_x_px:.1f}, "
+                "{seen_y_px:.1f}) and radius {seen_radius_px:.1f} px, got centre ({x_px:.1f}, "
+                "{y_px:.1f}) and radius {radius_px:.1f} px; {taken}: correct it, or leave circle "
+                "out",
+                subject="circle",
+                seen_x_px=seen.x,
+                seen_y_px=seen.y,
+                seen_radius_px=seen.radius,
+                x_px=x,
+                y_px=y,
+                radius_px=radius,
+                taken=taken,
+            )
         )
     if is_same:
         return found, warnings
@@ -439,8 +459,8 @@ def _mean_outline(outlines: Sequence[Outline]) -> Outline:
     return Outline(x, y, radius, np.mean([each.covariance for each in outlines], axis=0))
 
 
-def _cut_warnings(view: View, outline: Outline) -> list[str]:
-    """Return a line if the region or the frame cuts the outline, by how much on each side."""
+def _cut_warnings(view: View, outline: Outline) -> list[ResultWarning]:
+    """Return a warning if the region or the frame cuts the outline, by how much on each side."""
     left, top = view.corner
     high, wide = (count * view.cell for count in view.light.shape[:2])
     beyond = {
@@ -452,13 +472,17 @@ def _cut_warnings(view: View, outline: Outline) -> list[str]:
     cut = {side: px for side, px in beyond.items() if px > max(1.0, CUT * outline.radius)}
     if not cut:
         return []
-    sides = ", ".join(
-        f"{side} by {px:.0f} px ({px / outline.radius:.0%} of its radius)"
-        for side, px in cut.items()
-    )
     return [
-        f"region: expected the whole sphere in it, got its outline cut: {sides}; the outline rests "
-        "on what is left of it, and its error is in σ: enlarge the region"
+        Disturbance(
+            "outline-cut",
+            "expected the whole sphere in it, got its outline cut: {sides}; the outline rests on "
+            "what is left of it, and its error is in σ: enlarge the region",
+            subject="region",
+            sides=tuple(
+                f"{side} by {px:.0f} px ({px / outline.radius:.0%} of its radius)"
+                for side, px in cut.items()
+            ),
+        )
     ]
 
 

@@ -11,6 +11,7 @@ from labrig.calibration import CAMERA_KIND
 from labrig.fit.angular import fit_dependence
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Unmeasured
 from labrig.protocols.angular_fluorescence.analysis.channels import (
     chosen_channels,
     grouped,
@@ -40,7 +41,7 @@ class View:
     sigma: FloatArray
 
 
-def yarn_views(context: AnalysisContext) -> tuple[tuple[YarnViews, ...], list[str]]:
+def yarn_views(context: AnalysisContext) -> tuple[tuple[YarnViews, ...], list[ResultWarning]]:
     """Return the views of each LED and direction with their tests, and warnings.
 
     Raises
@@ -62,13 +63,16 @@ def yarn_views(context: AnalysisContext) -> tuple[tuple[YarnViews, ...], list[st
             try:
                 tested.append(_tested(context, lit, led, direction, level))
             except DataError as error:
-                refused.append(f"{direction} under {led}: {error}")
+                under = f"{direction} under {led}"
+                refused.append(
+                    Unmeasured("views-untested", "{reason}", subject=under, reason=str(error))
+                )
     if not tested:
-        raise DataError("; ".join(refused))
+        raise DataError("; ".join(map(str, refused)))
     return tuple(tested), [*warnings, *refused]
 
 
-def _views(context: AnalysisContext) -> tuple[list[View], list[str]]:
+def _views(context: AnalysisContext) -> tuple[list[View], list[ResultWarning]]:
     """Return all complete views, and a warning about each group of others."""
     on, off = (_series(context, role) for role in AngularFrames)
     units_on, units_off = grouped(on.unit), grouped(off.unit)
@@ -84,16 +88,27 @@ def _views(context: AnalysisContext) -> tuple[list[View], list[str]]:
         bright, bright_sigma = _mean(on, rows)
         dark, dark_sigma = _mean(off, units_off[pose.unit])
         views.append(View(pose, on.channels, bright - dark, np.hypot(bright_sigma, dark_sigma)))
-    warnings = []
+    warnings: list[ResultWarning] = []
     if missing:
         warnings.append(
-            f"{len(missing)} of {len(context.protocol.poses())} views are missing "
-            f"({_named(missing)}); the others are used (go on with labrig resume)"
+            Unmeasured(
+                "view-missing",
+                "{missing} of {views} views are missing ({named}); the others are used (go on with "
+                "labrig resume)",
+                missing=len(missing),
+                views=len(context.protocol.poses()),
+                named=_named(missing),
+            )
         )
     if clipped:
         warnings.append(
-            f"{len(clipped)} views clip ({_named(clipped)}) and are left out; lower camera.iso, or "
-            "name the brightest angle first"
+            Disturbance(
+                "view-clipped",
+                "{clipped} views clip ({named}) and are left out; lower camera.iso, or name the "
+                "brightest angle first",
+                clipped=len(clipped),
+                named=_named(clipped),
+            )
         )
     return views, warnings
 
@@ -116,7 +131,7 @@ def _mean(series: Series, rows: Sequence[int]) -> tuple[FloatArray, FloatArray]:
     return series.values[rows].mean(axis=0), sigma
 
 
-def _lit(views: Sequence[View]) -> tuple[list[View], list[str]]:
+def _lit(views: Sequence[View]) -> tuple[list[View], list[ResultWarning]]:
     """Return the views in which the LED was lit, and a warning about the others."""
     if not views:
         return [], []
@@ -126,11 +141,14 @@ def _lit(views: Sequence[View]) -> tuple[list[View], list[str]]:
     dark = [view.pose.unit for view, lit in zip(views, is_lit, strict=True) if not lit]
     if not dark:
         return list(views), []
-    line = (
-        f"{len(dark)} views are dark ({_named(dark)}) and are left out: the LED did not light, or "
-        "the yarn was not in the region"
+    warning = Unmeasured(
+        "view-dark",
+        "{dark} views are dark ({named}) and are left out: the LED did not light, or the yarn was "
+        "not in the region",
+        dark=len(dark),
+        named=_named(dark),
     )
-    return [view for view, lit in zip(views, is_lit, strict=True) if lit], [line]
+    return [view for view, lit in zip(views, is_lit, strict=True) if lit], [warning]
 
 
 def _tested(

@@ -13,6 +13,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.number_format import exposure_text, plus_minus
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning, Unmeasured
 from labrig.protocols.camera_calibration.analysis.factors import CardFrame, Factors, fit_factors
 from labrig.protocols.camera_calibration.analysis.flat_field import fit_flat, measure_glare
 from labrig.protocols.camera_calibration.analysis.linearity import (
@@ -270,26 +271,35 @@ def _warnings(
     transfers: Sequence[PhotonTransfer],
     factors: Factors,
     card: CardLevels,
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     for transfer in transfers:
         if transfer.reduced_chi2 > STRAIGHT_CHI2:
-            yield (
-                f"the noise at ISO {transfer.noise.iso:g} does not rise with the light as that of "
-                f"photons (χ² {transfer.reduced_chi2:.1f} a degree of freedom): does the camera "
-                "filter its RAW frames, or did something move?"
+            yield Contradiction(
+                "noise-not-of-photons",
+                "the noise at ISO {iso:g} does not rise with the light as that of photons (χ² "
+                "{reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW frames, "
+                "or did something move?",
+                iso=transfer.noise.iso,
+                reduced_chi2=transfer.reduced_chi2,
             )
     evident = [transfer for transfer in transfers if transfer.neighbours_share_noise]
     if evident:
         largest = max(evident, key=lambda transfer: transfer.shared)
-        yield (
-            f"neighbouring pixels share noise ({100 * largest.shared:.0f} % of a pixel's variance)"
-            ": the gain takes it into account"
+        yield Disturbance(
+            "pixels-share-noise",
+            "neighbouring pixels share noise ({shared:.0%} of a pixel's variance): the gain takes "
+            "it into account",
+            shared=largest.shared,
         )
     flicker, repeated = factors.flicker.value, factors.repeated.value
     if flicker - repeated > CLEAR_SIGMAS * factors.repeated.sigma:
-        yield (
-            f"brackets scatter by {100 * flicker:.2f} %, equal frames by {100 * repeated:.2f} %: "
-            "the lamp wandered, or a setting does not repeat well; factors are no better than that"
+        yield Disturbance(
+            "brackets-scatter",
+            "brackets scatter by {brackets_percent:.2f} %, equal frames by {repeated_percent:.2f} "
+            "%: the lamp wandered, or a setting does not repeat well; factors are no better than "
+            "that",
+            brackets_percent=100 * flicker,
+            repeated_percent=100 * repeated,
         )
     if file.linearity is not None:
         curve = zip(
@@ -297,29 +307,48 @@ def _warnings(
         )
         bent_levels = [level for level, d, s in curve if abs(d) > max(BENT, CLEAR_SIGMAS * s)]
         if bent_levels:
-            yield (
-                f"the sensor is off a straight line by more than 1 % at {bent_levels[0]:.0f} DN "
-                "above dark: keep the brightest level of a measurement well below"
+            yield Disturbance(
+                "sensor-nonlinear",
+                "the sensor is off a straight line by more than 1 % at {level_dn:.0f} DN above "
+                "dark: keep the brightest level of a measurement well below",
+                level_dn=bent_levels[0],
             )
         if file.linearity.saturation_dn is None:
-            yield "no frame saturated; the level at which the sensor is full is not known"
+            yield Unmeasured(
+                "saturation-unmeasured",
+                "no frame saturated; the level at which the sensor is full is not known",
+            )
     shutter_errors = [
         factor
         for factor in file.shutter
         if abs(factor.factor - 1) > max(OFF, CLEAR_SIGMAS * factor.sigma)
     ][:3]
     if shutter_errors:
-        named = ", ".join(
-            f"{exposure_text(factor.setting)}, × {plus_minus(factor.factor, factor.sigma)}"
-            for factor in shutter_errors
+        yield Contradiction(
+            "shutter-times-off",
+            "shutter times are off by more than 5 % ({times}): longer ones are more exact",
+            times=tuple(
+                f"{exposure_text(factor.setting)}, × {plus_minus(factor.factor, factor.sigma)}"
+                for factor in shutter_errors
+            ),
         )
-        yield f"shutter times are off by more than 5 % ({named}): longer ones are more exact"
-    if any(max(map(abs, row)) > UNEVEN for flat in file.flats for row in flat.gradient):
-        yield "the card is lit unevenly, by more than 20 %: move the lamp further away"
+    gradients = [max(map(abs, row)) for flat in file.flats for row in flat.gradient]
+    if gradients and max(gradients) > UNEVEN:
+        yield Disturbance(
+            "card-uneven",
+            "the card is lit unevenly, by more than 20 %: move the lamp further away",
+            gradient=max(gradients),
+        )
     if file.glare is not None and file.glare.fraction > MUCH_GLARE:
-        yield (
-            f"{100 * file.glare.fraction:.1f} % of the frame's light lies over all of it: clean "
-            "the lens and shade it, and look whether the black trap is black"
+        yield Disturbance(
+            "glare",
+            "{glare:.1%} of the frame's light lies over all of it: clean the lens and shade it, "
+            "and look whether the black trap is black",
+            glare=file.glare.fraction,
         )
     if clipped := card.clipped:
-        yield f"{clipped} frames of the card clip and are left out; lower camera.iso"
+        yield Disturbance(
+            "frames-clipped",
+            "{clipped} frames of the card clip and are left out; lower camera.iso",
+            clipped=clipped,
+        )

@@ -286,7 +286,7 @@ def render(result: DecayResult, source: Source) -> Rendered:
         background=result.background,
         states=result.states_requested,
     )
-    lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
+    lines = tuple(f"{name}\n{fit.table()}" for name, fit in result.fits.items())
     results, method_sections = decay_sections(report, source.anchor)
     unrecorded = unrecorded_temperature(result)
     sections = (*results, *outside_sections(result))

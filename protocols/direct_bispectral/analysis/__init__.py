@@ -5,7 +5,7 @@ readings of a run follows one law: read noise, dark current, and shot noise of t
 pixels of a repetition share is the noise of the dark pixels, which are subtracted.
 """
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,7 +26,14 @@ from labrig.fit.bispectral import (
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.nonnegative import nonnegative_least_squares
-from labrig.foundation.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus as plus_minus
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    ResultWarning,
+    Undetermined,
+    Unmeasured,
+)
 from labrig.optics import SpectrometerReading, Spectrum, Transmittance, read_spectrometer_reading
 from labrig.protocols.direct_bispectral.analysis.checks import (
     ambient_light,
@@ -173,7 +180,7 @@ def analyse(context: AnalysisContext) -> DirectBispectralResult:
     warnings = [*ambient_light(list(readings.dark.values())), *warnings, *of_whites]
     if not whites:
         raise DataError(
-            f"no light can be used: {'; '.join(warnings) or 'no reading is complete'}; go on with "
+            f"no light can be used: {_joined(warnings) or 'no reading is complete'}; go on with "
             "labrig resume, or measure again"
         )
     first = protocol.shuffled()[0]
@@ -191,7 +198,10 @@ def analyse(context: AnalysisContext) -> DirectBispectralResult:
         drift = _drift(before, spectra.get((name, first, True)))
         warnings += _drift_warnings(name, first, drift)
         unread = [light for light in whites if (name, light, False) not in readings.lit]
-        warnings += [f"{name}: was not read under {light}" for light in unread]
+        warnings += [
+            Unmeasured("not-read", "was not read under {light}", subject=name, light=light)
+            for light in unread
+        ]
         scale_sigma = np.interp(output_nm, *scale)
         columns, of_columns = _columns(name, whites, lit, output_nm, scale_sigma, card,
                                        (white_drift, drift))  # fmt: skip
@@ -200,7 +210,7 @@ def analyse(context: AnalysisContext) -> DirectBispectralResult:
             samples[name] = columns
     if not samples:
         raise DataError(
-            f"no sample was read under a light that can be used: {'; '.join(warnings)}; go on with "
+            f"no sample was read under a light that can be used: {_joined(warnings)}; go on with "
             "labrig resume"
         )
     lights = [_light_spectrum(name, white, context.rig) for name, white in whites.items()]
@@ -258,20 +268,30 @@ class _Readings:
 
 def _spectra(
     readings: _Readings, noise: ReadingNoise, card: Transmittance
-) -> tuple[dict[tuple[str, str, bool], _Lit], list[str]]:
+) -> tuple[dict[tuple[str, str, bool], _Lit], list[ResultWarning]]:
     """Return what came of all lights, of the white reference over its reflectance."""
-    spectra, warnings = {}, []
+    spectra: dict[tuple[str, str, bool], _Lit] = {}
+    warnings: list[ResultWarning] = []
     left: dict[str, dict[str, float]] = {}
     for (stage, light, again), reading in readings.lit.items():
         dark = readings.dark.get((stage, round(reading.integration_s, 9)))
         where = f"{stage} under {light}"
         if dark is None:
-            warnings.append(f"{where}: there is no dark reading of the same time; it is left out")
+            warnings.append(
+                Unmeasured(
+                    "no-dark-reading",
+                    "there is no dark reading of the same time; it is left out",
+                    subject=where,
+                )
+            )
             continue
         if reading.saturated.any():
             warnings.append(
-                f"{where}: pixels are saturated; it is left out: dim the light or set 'longest' "
-                "shorter"
+                Disturbance(
+                    "spectrometer-saturated",
+                    "pixels are saturated; it is left out: dim the light or set 'longest' shorter",
+                    subject=where,
+                )
             )
             continue
         off = readings.off.get((stage, light, again))
@@ -282,16 +302,23 @@ def _spectra(
         if stage == WHITE:
             spectrum = spectrum.divided_by(card.at(spectrum.wavelength_nm))
         spectra[stage, light, again] = _Lit(spectrum, reading.integration_s)
-    return spectra, [*warnings, *(_left_line(stage, parts) for stage, parts in left.items())]
+    return spectra, [*warnings, *(_left_warning(stage, parts) for stage, parts in left.items())]
 
 
-def _left_line(stage: str, parts: Mapping[str, float]) -> str:
-    return (
-        f"{stage}: with all LEDs off the light was another than in the dark before, after "
-        f"{', '.join(parts)} (by up to {max(parts.values()):.1%} of that with the LED); it was "
-        "subtracted as if it had been steady: an LED stays lit, or another light is on; check the "
-        "LEDs' relays, darken the room"
+def _left_warning(stage: str, parts: Mapping[str, float]) -> ResultWarning:
+    return Disturbance(
+        "light-left",
+        "with all LEDs off the light was another than in the dark before, after {lights} (by up to "
+        "{most:.1%} of that with the LED); it was subtracted as if it had been steady: an LED "
+        "stays lit, or another light is on; check the LEDs' relays, darken the room",
+        subject=stage,
+        lights=tuple(parts),
+        most=max(parts.values()),
     )
+
+
+def _joined(warnings: Iterable[ResultWarning]) -> str:
+    return "; ".join(map(str, warnings))
 
 
 def _lit_spectrum(
@@ -335,23 +362,34 @@ def _usable_whites(
     rig: RigFile,
     *,
     are_filters: bool,
-) -> tuple[dict[str, _Lit], list[str]]:
+) -> tuple[dict[str, _Lit], list[ResultWarning]]:
     """Return the lights that lit the white reference alone, and what is wrong with the others.
 
     Of those that were read and are not among `whites` it has been said.
     """
-    warnings, lit = [], {}
+    warnings: list[ResultWarning] = []
+    lit: dict[str, _Lit] = {}
     for name in lights:
         if name not in whites:
             if name not in read:
-                warnings.append(f"{name}: the white reference was not read under it; left out")
+                warnings.append(
+                    Unmeasured(
+                        "not-read",
+                        "the white reference was not read under it; left out",
+                        subject=name,
+                    )
+                )
             continue
         try:
             window_nm = light_window_nm(whites[name].spectrum)
         except DataError:
             warnings.append(
-                f"{name}: gave no light on the white reference; its column is left out: does it "
-                "light, and is it plugged in?"
+                Unmeasured(
+                    "light-unlit",
+                    "gave no light on the white reference; its column is left out: does it light, "
+                    "and is it plugged in?",
+                    subject=name,
+                )
             )
             continue
         filter_nm = _filter_window_nm(rig, name) if are_filters else None
@@ -368,8 +406,13 @@ def _usable_whites(
             warnings.append(other)
         elif too_near := [kept for kept in usable if _distance_nm(usable[kept], white) < APART_NM]:
             warnings.append(
-                f"{name}: has the same spectrum as {too_near[0]}; left out: is it connected to "
-                "another output than the rig file says?"
+                Contradiction(
+                    "light-is-another",
+                    "has the same spectrum as {other}; left out: is it connected to another output "
+                    "than the rig file says?",
+                    subject=name,
+                    other=too_near[0],
+                )
             )
         else:
             usable[name] = white
@@ -445,17 +488,23 @@ def _has_lit(drift: Measured) -> bool:
     return drift.value > GONE
 
 
-def _drift_warnings(what: str, light: str, drift: Measured) -> Iterator[str]:
+def _drift_warnings(what: str, light: str, drift: Measured) -> Iterator[ResultWarning]:
     if drift.value <= GONE:
-        yield (
-            f"{what}: under {light}, read once more at the end, it gave no light any more: the LED "
-            "went out, check its plug; whether anything drifted or bleached is not known"
+        yield Unmeasured(
+            "light-went-out",
+            "under {light}, read once more at the end, it gave no light any more: the LED went "
+            "out, check its plug; a drift or bleaching is not determined",
+            subject=what,
+            light=light,
         )
     if _is_drifted(drift) and abs(drift.value - 1) > TOLD_DRIFT:
-        yield (
-            f"{what}: under {light}, read once more at the end, it gave "
-            f"{plus_minus(drift.value, drift.sigma)} of its light at the begin: the light changed "
-            "or the sample bleaches; the change is in σ"
+        yield Disturbance(
+            "sample-bleached",
+            "under {light}, read once more at the end, it gave {ratio.plus_minus} of its light at "
+            "the begin: the light changed or the sample bleaches; the change is in σ",
+            subject=what,
+            light=light,
+            ratio=drift,
         )
 
 
@@ -467,9 +516,9 @@ def _columns(
     scale_sigma: FloatArray,
     card: Transmittance,
     drifts: tuple[Measured, Measured],
-) -> tuple[DirectColumns | None, list[str]]:
+) -> tuple[DirectColumns | None, list[ResultWarning]]:
     """Return the columns of a sample, None without any, and what is wrong with the others."""
-    warnings = []
+    warnings: list[ResultWarning] = []
     # What changed between the first reading and the last, evenly somewhere in between.
     changes = [abs(drift.value - 1) / np.sqrt(12) for drift in drifts if _is_drifted(drift)]
     used: list[str] = []
@@ -480,8 +529,13 @@ def _columns(
         )
         if (one.column <= SIGNIFICANT * one.column_sigma).all():
             warnings.append(
-                f"{name}: no light came back under {light}; left out: did it light, and does the "
-                "sample lie before the spectrometer?"
+                Undetermined(
+                    "no-light-back",
+                    "no light came back under {light}; left out: did it light, and does the sample "
+                    "lie before the spectrometer?",
+                    subject=name,
+                    light=light,
+                )
             )
         elif stray := stray_in_column(name, light, one):
             warnings.append(stray)

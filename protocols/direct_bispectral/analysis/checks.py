@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit.bispectral import BispectralColumns, IlluminatedSpectrum
+from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning
 from labrig.optics import SpectrometerReading
 
 #: Ends of the range within which a light's power is counted, in nm.
@@ -36,8 +37,8 @@ TOLD_AMBIENT_PER_S = 2.0
 TOLD_LEFT = 2e-3
 
 
-def second_peak(name: str, light: IlluminatedSpectrum, window_nm: Window) -> str | None:
-    """Return what to say of a light whose band on the white reference has two peaks."""
+def second_peak(name: str, light: IlluminatedSpectrum, window_nm: Window) -> ResultWarning | None:
+    """Return a warning of a light whose band on the white reference has two peaks."""
     from scipy.signal import find_peaks  # takes as long to load as half of labrig
 
     low_nm, high_nm = window_nm
@@ -50,14 +51,18 @@ def second_peak(name: str, light: IlluminatedSpectrum, window_nm: Window) -> str
     places, _ = find_peaks(smooth, prominence=prominence)
     if len(places) < 2:
         return None
-    peaks = " and ".join(f"{at_nm:.0f} nm" for at_nm in nm[inside][places])
-    return f"{name}: the white reference shows peaks at {peaks}: two lights are alight; left out"
+    return Disturbance(
+        "two-lights",
+        "the white reference shows peaks at {peaks}: two lights are alight; left out",
+        subject=name,
+        peaks=" and ".join(f"{at_nm:.0f} nm" for at_nm in nm[inside][places]),
+    )
 
 
 def other_light(
     name: str, lights: Mapping[str, IlluminatedSpectrum], windows_nm: Mapping[str, Window]
-) -> str | None:
-    """Return what to say of a light whose white reading shows another of the lights as well."""
+) -> ResultWarning | None:
+    """Return a warning of a light whose white reading shows another of the lights as well."""
     light = lights[name]
     low_nm, high_nm = windows_nm[name]
     nm = light.wavelength_nm
@@ -72,9 +77,13 @@ def other_light(
         if not there.any() or amount < max(SIGNIFICANT * sigma, TOLD_OTHER * power):
             continue
         if np.corrcoef(light.value[there], spectrum.value[there])[0, 1] > SAME_LIGHT:
-            return (
-                f"{name}: with it shines {other} ({100 * amount / power:.1f} % of its light on the "
-                "white reference): two are alight; left out"
+            return Disturbance(
+                "two-lights",
+                "{other} shines with it ({part:.1%} of its light on the white reference): two are "
+                "alight; left out",
+                subject=name,
+                other=other,
+                part=amount / power,
             )
     return None
 
@@ -91,41 +100,50 @@ def part_beyond(light: IlluminatedSpectrum, window_nm: Window) -> tuple[float, f
 
 def light_beyond(
     name: str, light: IlluminatedSpectrum, window_nm: Window, *, is_filter: bool
-) -> Iterator[str]:
-    """Yield what to say of light at longer wavelengths than a light's own band."""
+) -> Iterator[ResultWarning]:
+    """Yield a warning of light at longer wavelengths than a light's own band."""
     part, sigma = part_beyond(light, window_nm)
     if part <= max(SIGNIFICANT * sigma, TOLD_BEYOND):
         return
     if is_filter:
-        yield (
-            f"{name}: {100 * part:.2f} % of its light is beyond its pass band: the filter leaks, "
-            "and re-radiation there is hardly told from that; put a short-pass filter with it"
+        yield Disturbance(
+            "filter-leaks",
+            "{part:.2%} of its light is beyond its pass band: the filter leaks, and re-radiation "
+            "there is hardly distinguished from that; put a short-pass filter with it",
+            subject=name,
+            part=part,
         )
     else:
-        yield (
-            f"{name}: {100 * part:.2f} % of its light on the white reference is beyond its band: "
-            "the reference fluoresces, or the light shines there, too; use a reference of PTFE or "
-            "barium sulphate to find out"
+        yield Disturbance(
+            "reference-fluoresces",
+            "{part:.2%} of its light on the white reference is beyond its band: the reference "
+            "fluoresces, or the light shines there, too; use a reference of PTFE or barium "
+            "sulphate to find out",
+            subject=name,
+            part=part,
         )
 
 
 def disorder(
     name: str, light: IlluminatedSpectrum, window_nm: Window, named_nm: float
-) -> Iterator[str]:
-    """Yield what to say of a light with another peak than the rig file says."""
+) -> Iterator[ResultWarning]:
+    """Yield a warning of a light with another peak than the rig file says."""
     low_nm, high_nm = window_nm
     inside = (light.wavelength_nm >= low_nm) & (light.wavelength_nm <= high_nm)
     peak_nm = float(light.wavelength_nm[inside][light.value[inside].argmax()])
     if abs(peak_nm - named_nm) > TOLD_SHIFT_NM:
-        yield (
-            f"{name}: its light has its peak at {peak_nm:.0f} nm, the rig file says "
-            f"{named_nm:.0f} nm: are the LEDs connected in another order? The measured spectrum is "
-            "taken"
+        yield Contradiction(
+            "peak-differs",
+            "its light has its peak at {peak_nm:.0f} nm, the rig file says {named_nm:.0f} nm: are "
+            "the LEDs connected in another order? The measured spectrum is taken",
+            subject=name,
+            peak_nm=peak_nm,
+            named_nm=named_nm,
         )
 
 
-def stray_in_column(name: str, light: str, column: BispectralColumns) -> str | None:
-    """Return what to say of a column with light at shorter wavelengths than its own."""
+def stray_in_column(name: str, light: str, column: BispectralColumns) -> ResultWarning | None:
+    """Return a warning of a column with light at shorter wavelengths than its own."""
     ends = column.output_nm < column.window_nm[0, 0] - 5.0
     # What a light itself has there, as a filter that leaks, comes back at most as of a white.
     own = WHITE_REFLECTANCE * np.maximum(column.share[ends, 0], 0.0)
@@ -134,16 +152,19 @@ def stray_in_column(name: str, light: str, column: BispectralColumns) -> str | N
         return None
     worst = int(np.argmax(value / np.maximum(sigma, 1e-300)))
     if value[worst] > max(SIGNIFICANT * sigma[worst], TOLD_STRAY):
-        return (
-            f"{name}: under {light} light came back at {column.output_nm[ends][worst]:g} nm, of "
-            "shorter wavelength than the light: another light was on, or the room's changed; its "
-            "column is left out"
+        return Disturbance(
+            "stray-light",
+            "under {light} light came back at {wavelength_nm:g} nm, of shorter wavelength than the "
+            "light: another light was on, or the room's changed; its column is left out",
+            subject=name,
+            light=light,
+            wavelength_nm=column.output_nm[ends][worst],
         )
     return None
 
 
-def ambient_light(darks: Sequence[SpectrometerReading]) -> Iterator[str]:
-    """Yield what to say of light with all lights off.
+def ambient_light(darks: Sequence[SpectrometerReading]) -> Iterator[ResultWarning]:
+    """Yield a warning of light with all lights off.
 
     Offsets fall out between a long and a short reading, dark current is that of the ends.
     """
@@ -158,9 +179,11 @@ def ambient_light(darks: Sequence[SpectrometerReading]) -> Iterator[str]:
     grown = longest.corrected().counts - shortest.corrected().counts
     light, sigma = _standing_out(np.delete(grown, list(longest.dark_pixels)))
     if light > max(SIGNIFICANT * sigma, TOLD_AMBIENT_PER_S * time_s):
-        yield (
-            f"with all lights off the spectrometer sees light ({light / time_s:.0f} counts a "
-            "second); what stays the same is subtracted: darken the room, cover displays"
+        yield Disturbance(
+            "light-left",
+            "with all lights off the spectrometer sees light ({counts_per_s:.0f} counts a second); "
+            "what stays the same is subtracted: darken the room, cover displays",
+            counts_per_s=light / time_s,
         )
 
 

@@ -27,6 +27,12 @@ from labrig.calibration import (
 from labrig.fit.excitation import RelativeSigmas
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Misfit,
+    ResultWarning,
+    Unmeasured,
+)
 from labrig.protocols.excitation.analysis.charge_intervals import GLOWING
 from labrig.protocols.excitation.analysis.charging_series import evened, patch_chargings
 from labrig.protocols.excitation.analysis.closure import predicted_charging
@@ -155,7 +161,8 @@ def analyse(context: AnalysisContext) -> ExcitationResult:
         list(chargings),
         lambda patch: _patch_excitation(context, patch, chargings[patch], irradiance, warming),
     )
-    unmeasured = () if fade else ("the lamp's fade was not measured: a usual one was taken",)
+    usual = Unmeasured("fade-unmeasured", "the lamp's fade was not measured: a usual one was taken")
+    unmeasured = () if fade else (usual,)
     leaks = blank.leaks() if blank else ()
     return ExcitationResult(
         irradiance=irradiance,
@@ -170,7 +177,7 @@ def _patch_excitation(
     charging: PatchCharging,
     irradiance: IrradianceFile,
     warming: Warming,
-) -> tuple[PatchExcitation, Sequence[str]]:
+) -> tuple[PatchExcitation, Sequence[ResultWarning]]:
     """Return the patch's excitation, and warnings."""
     decay = fit_series(charging.whole, _states(context, patch))
     charging = remembered_warmth(charging, decay, warming.deficit, warming.time_constant_s)
@@ -218,7 +225,12 @@ def _patch_excitation(
     frames = tuple(frame.path.name for role in GLOWING for frame in run.frames(role))
     material = excited_material(fit, irradiance, spectrum, patch.material, run.name, frames)
     no_spectrum = (
-        ("no emission spectrum was found of this patch, so that its material has no Λ",)
+        (
+            Unmeasured(
+                "no-emission-spectrum",
+                "no emission spectrum of this patch was measured, so that its material has no Λ",
+            ),
+        )
         if spectra and spectrum is None
         else ()
     )
@@ -287,7 +299,7 @@ def _scale(
     return radiometric_scale(context, irradiance, spectrum, channel, iso, aperture)
 
 
-def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
+def _light_warnings(fit: FittedExcitation) -> Iterator[ResultWarning]:
     if max((fit.lamp_sigma / LAMP_SIGMA, *fit.site_sizes)) > AT_END * MAX_FACTOR:
         light = light_scatter(fit)
         places = (
@@ -296,25 +308,35 @@ def _light_warnings(fit: FittedExcitation) -> Iterator[str]:
             else f", {100 * light.sites:.1f} % from place to place and {light.wavelength_nm:.1f} "
             "nm in wavelength"
         )
-        yield (
-            f"the light seems to be off by {100 * light.lamp:.1f} % from charge to charge{places}, "
-            "which is about the most that is tried, so that σ may be too small: the "
-            "irradiance is of another bench or filter, excitation changes much within a band (give "
-            "narrower bands to irradiance), or the rate equation does not hold"
+        yield Misfit(
+            "light-scatters",
+            "the light seems to be off by {lamp_percent:.1f} % from charge to charge{places}, "
+            "which is about the most that is tried, so that σ may be too small: the irradiance is "
+            "of another bench or filter, excitation changes much within a band (give narrower "
+            "bands to irradiance), or the rate equation does not hold",
+            lamp_percent=100 * light.lamp,
+            places=places,
         )
 
 
-def _layer_warnings(fit: FittedExcitation) -> Iterator[str]:
+def _layer_warnings(fit: FittedExcitation) -> Iterator[ResultWarning]:
     if fit.layer is not None and fit.layer.is_shown:
-        yield f"the charges are those of a layer, not a surface: {fit.layer}; measure a thinner one"
+        yield Misfit(
+            "layer-thick",
+            "the charges are those of a layer, not a surface: {effect}; measure a thinner one",
+            effect=str(fit.layer),
+        )
 
 
-def _closure_warnings(closure: Closure | None) -> Iterator[str]:
+def _closure_warnings(closure: Closure | None) -> Iterator[ResultWarning]:
     if closure is not None and closure.rms_sigma > CLOSURE_SIGMAS:
-        yield (
-            f"charging by the lamp itself is predicted from the bands only within "
-            f"{closure.rms_percent:.1f} % ({closure.rms_sigma:.1f} σ): the lamp has light outside "
-            "of the bands, the ratio of irradiances is wrong, or the rate equation does not hold"
+        yield Contradiction(
+            "closure-failed",
+            "charging by the lamp itself is predicted from the bands only within "
+            "{rms_percent:.1f} % ({rms_sigmas:.1f} σ): the lamp has light outside of the bands, "
+            "the ratio of irradiances is wrong, or the rate equation does not hold",
+            rms_percent=closure.rms_percent,
+            rms_sigmas=closure.rms_sigma,
         )
 
 

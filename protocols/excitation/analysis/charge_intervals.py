@@ -5,10 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from labrig.acquire import DARK, LAMP, LEDS
-from labrig.analyse.frames import left_out_lines
+from labrig.analyse.frames import left_out_warnings
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import ResultWarning
 from labrig.protocols.excitation.protocol import ExcitationFrames, UnitKind
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
 
@@ -65,7 +66,7 @@ class ChargeFrames:
 
     intervals: Sequence[ChargeInterval]
     charge_of: Mapping[FrameRecord, ChargeInterval]
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[ResultWarning, ...] = ()
 
     @property
     def zero_s(self) -> float:
@@ -122,7 +123,7 @@ def charge_frames(
     frames.sort(key=lambda frame: frame.start_time)
     interval_of = {frame: _interval_before(intervals, frame) for frame in frames}
     charge_of = {frame: interval for frame, interval in interval_of.items() if interval is not None}
-    left_out: tuple[str, ...] = ()
+    left_out: tuple[ResultWarning, ...] = ()
     if blank is not None and charge_of:
         charge_of, left_out = _without_stray_light(charge_of, blank)
     if not charge_of or len({interval.is_direct for interval in intervals}) < 2:
@@ -144,9 +145,9 @@ def _begin(interval: ChargeInterval) -> float:
 
 def _without_stray_light(
     charge: Mapping[FrameRecord, ChargeInterval], blank: BlankFile
-) -> tuple[dict[FrameRecord, ChargeInterval], tuple[str, ...]]:
+) -> tuple[dict[FrameRecord, ChargeInterval], tuple[ResultWarning, ...]]:
     after_s = {frame: frame.start_time - interval.off_s for frame, interval in charge.items()}
-    left_out = left_out_lines(list(after_s.values()), blank)
+    left_out = left_out_warnings(list(after_s.values()), blank)
     return {frame: charge[frame] for frame, t in after_s.items() if blank.is_clean(t)}, left_out
 
 

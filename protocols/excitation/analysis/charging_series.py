@@ -22,6 +22,7 @@ from labrig.calibration import BLANK_KIND, CAMERA_KIND, FADE_KIND, IrradianceFil
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import ResultWarning
 from labrig.protocols.excitation.analysis.charge_intervals import (
     ChargeFrames,
     ChargeInterval,
@@ -177,7 +178,7 @@ NOTHING: FloatArray = np.empty((0, 0, 0))
 
 def patch_chargings(
     context: AnalysisContext, irradiance: IrradianceFile, warming: Warming
-) -> tuple[dict[StripPatch, PatchCharging], tuple[str, ...]]:
+) -> tuple[dict[StripPatch, PatchCharging], tuple[ResultWarning, ...]]:
     """Read and reduce all frames of the run to the charging of each patch, and warnings.
 
     Parameters

@@ -19,6 +19,7 @@ from labrig.fit.excitation import (
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import RATE_LIMIT_SIGMA, STRONG_EVIDENCE_DELTA_BIC
+from labrig.foundation.result_warning import Misfit, ResultWarning
 from labrig.protocols.excitation.options import FREE
 from labrig.results import (
     AUTO,
@@ -147,7 +148,7 @@ class ChosenOrders:
 
     best: FittedExcitation
     relative_sigmas: RelativeSigmas
-    doubt: tuple[str, ...] = ()
+    doubt: tuple[ResultWarning, ...] = ()
 
     def fitted(
         self, series: Sequence[ChargingSeries], intervals: IntervalChoice = "none"
@@ -192,11 +193,14 @@ def _model(fit: FittedExcitation, order: float | None, enlarged: float = 1.0) ->
     return ExcitationModel(states, order, number, fit.reduced_chi2, bic)
 
 
-def _doubt(fit: FittedExcitation) -> Iterator[str]:
+def _doubt(fit: FittedExcitation) -> Iterator[ResultWarning]:
     """Yield a warning if orders that are held at 1 contradict the data."""
     penalty = STRONG_EVIDENCE_DELTA_BIC + len(fit.states) * np.log(fit.dof)
     if fit.order_gain > penalty * max(1.0, fit.reduced_chi2):
-        yield (
-            f"charges and decays contradict the first order (χ² {fit.chi2:.0f} would fall by "
-            f"{fit.order_gain:.0f} or more): fit the kinetic order with --order auto"
+        yield Misfit(
+            "order-contradicted",
+            "charges and decays contradict the first order (χ² {chi2:.0f} would fall by {gain:.0f} "
+            "or more): fit the kinetic order with --order auto",
+            chi2=fit.chi2,
+            gain=fit.order_gain,
         )

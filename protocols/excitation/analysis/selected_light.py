@@ -15,6 +15,7 @@ import numpy as np
 from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import ExcitationCourse, excitation_course
 from labrig.foundation.arrays import FloatArray, IntArray
+from labrig.foundation.result_warning import Extrapolated, ResultWarning
 from labrig.protocols.excitation.analysis.lamp_light import KNOWN, WORST
 from labrig.protocols.excitation.result import PatchCharging
 from labrig.results import FittedExcitation
@@ -179,8 +180,8 @@ def course_of(fit: FittedExcitation, file: IrradianceFile) -> ExcitationCourse:
     return excitation_course(np.array(file.cells_nm), np.array(file.bands_nm), growth, growth_sigma)
 
 
-def course_warnings(fit: FittedExcitation, file: IrradianceFile) -> Iterator[str]:
-    """Yield a line if the course of excitation within the bands changes rates much.
+def course_warnings(fit: FittedExcitation, file: IrradianceFile) -> Iterator[ResultWarning]:
+    """Yield a warning if the course of excitation within the bands changes rates much.
 
     Parameters
     ----------
@@ -199,10 +200,12 @@ def course_warnings(fit: FittedExcitation, file: IrradianceFile) -> Iterator[str
         if rate[number] > LARGE * rate.max() and abs(change) > NOTABLE:
             bands.append(f"{low:g}-{high:g} nm by {-100 * change / (1 + change):+.0f} %")
     if bands:
-        yield (
+        yield Extrapolated(
+            "excitation-uneven",
             "excitation changes so much from band to band that rates by narrow lights were taken "
-            f"for another part of the band than its mean ({', '.join(bands)}), and σ has the doubt "
-            "in it: select more lights, and give irradiance bands_nm as narrow as their distance"
+            "for another part of the band than its mean ({bands}), and σ has the doubt in it: "
+            "select more lights, and give irradiance bands_nm as narrow as their distance",
+            bands=tuple(bands),
         )
 
 

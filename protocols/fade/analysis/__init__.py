@@ -20,8 +20,9 @@ from labrig.calibration import CAMERA_KIND, LVF_KIND, CameraFile, Change, FadeFi
 from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
-from labrig.foundation.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus as plus_minus
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import Disturbance, Misfit, ResultWarning
 from labrig.optics import CameraResponse, Spectrum
 from labrig.protocols.fade.analysis.change import FittedChange
 from labrig.protocols.fade.analysis.fit import fit_change
@@ -379,20 +380,30 @@ def _rounded(value: float) -> float:
     return float(f"{value:.5g}")
 
 
-def _warnings(changes: Mapping[str, LampChange]) -> Iterator[str]:
+def _warnings(changes: Mapping[str, LampChange]) -> Iterator[ResultWarning]:
     for role, change in changes.items():
         if change.best.reduced_chi2 > BAD_CHI2 + BAD_SIGMAS * np.sqrt(2 / change.best.dof):
-            yield (
-                f"the {role} is not that of a glowing body (χ² {change.best.reduced_chi2:.1f} a "
-                "degree of freedom): is it a halogen lamp, and are its spectrum and the camera's "
-                "curves those of this bench?"
+            yield Misfit(
+                "lamp-not-glowing-body",
+                "the {role} is not that of a glowing body (χ² {reduced_chi2:.1f} a degree of "
+                "freedom): is it a halogen lamp, and are its spectrum and the camera's curves "
+                "those of this bench?",
+                role=role,
+                reduced_chi2=change.best.reduced_chi2,
             )
         exponent, sigma = change.exponent.value, change.exponent.sigma
         if abs(exponent - 1) > max(0.1, 4 * sigma):
-            yield (
-                f"the {role} follows the wavelength with an exponent of "
-                f"{plus_minus(exponent, sigma)}, a glowing body has 1: see optics.lamp and "
-                "optics.camera in the rig file"
+            yield Misfit(
+                "lamp-exponent",
+                "the {role} follows the wavelength with an exponent of {exponent.plus_minus}, a "
+                "glowing body has 1: see optics.lamp and optics.camera in the rig file",
+                role=role,
+                exponent=change.exponent,
             )
         if clipped := change.frames.clipped:
-            yield f"{clipped} photographs of the {role} clip and are left out; lower camera.iso"
+            yield Disturbance(
+                "frames-clipped",
+                "{clipped} photographs of the {role} clip and are left out; lower camera.iso",
+                clipped=clipped,
+                role=role,
+            )

@@ -1,7 +1,7 @@
 """Analysis of a calibration of LEDs, from its frames and spectra to spectra and brightnesses."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +23,13 @@ from labrig.fit.leds import (
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    ResultWarning,
+    Undetermined,
+    Unmeasured,
+)
 from labrig.optics import Spectrum
 from labrig.protocols.led_brightness.analysis.checks import (
     Bank,
@@ -38,8 +45,6 @@ from labrig.protocols.led_brightness.analysis.readings import (
 )
 from labrig.protocols.led_brightness.result import (
     LedBrightnessResult,
-    LedFault,
-    LedFinding,
     LedMeasured,
 )
 from labrig.protocols.steps.led_scenes import AGAIN, CARD
@@ -85,7 +90,7 @@ def analyse(context: AnalysisContext) -> LedBrightnessResult:
     bank, of_cards = _without_unseen(checked, bank, of_cards)
     measured = _measured(bank, of_cards, by_led, checked)
     if all(led.value is None and led.light is None for led in measured):
-        reasons = "; ".join(finding.text for finding in checked.findings)
+        reasons = "; ".join(map(str, checked.warnings))
         raise DataError(f"{context.run.folder}: no LED can be used: {reasons}")
     drift = _drift(context.protocol.shuffled()[0], values, spectra)
     return _Calibration(context, bank, of_cards, by_led, checked, measured, drift).result()
@@ -113,11 +118,14 @@ def _without_unseen(
     found = unseen_channels(bank, values)
     if not found or len(found) == len(bank.camera.channels):
         return bank, dict(values)
-    text = (
-        f"the camera's channel {', '.join(found)} sees no LED and is left out; check its "
-        "curves, and what lies before the lens"
+    checked.warnings.append(
+        Unmeasured(
+            "channel-unseen",
+            "the camera's channel {channels} sees no LED and is left out; check its curves, and "
+            "what lies before the lens",
+            channels=tuple(found),
+        )
     )
-    checked.found(LedFault.UNSEEN_CHANNEL, (), text)
     kept = [n for n, channel in enumerate(bank.camera.channels) if channel not in found]
     camera = replace(
         bank.camera,
@@ -220,7 +228,6 @@ class _Calibration:
         fit = fit_brightness(self.measured, self.bank.camera, self.bank.card, response)
         brightness = self._brightness(fit)
         comparison = self._compared(response)
-        findings = [*self.checked.findings, *self._judged(brightness, comparison)]
         uv_scale = self._uv_scale(brightness)
         leds = {
             led.name: self._calibrated(number, led, fit, brightness[led.name])
@@ -243,8 +250,7 @@ class _Calibration:
                 for led in self.measured
             },
             drift=self.drift,
-            findings=tuple(findings),
-            warnings=tuple(finding.text for finding in findings),
+            warnings=(*self.checked.warnings, *self._judged(brightness, comparison)),
         )
 
     @property
@@ -345,38 +351,41 @@ class _Calibration:
 
     def _judged(
         self, brightness: Mapping[str, Measured | None], comparison: _Comparison | None
-    ) -> list[LedFinding]:
-        """Return what the numbers themselves show to be amiss."""
-        findings = []
+    ) -> Iterator[ResultWarning]:
+        """Yield warnings of what the numbers themselves show to be amiss."""
         unseen = [led.name for led in self.measured if self._is_unseen(led)]
         if unseen:
-            text = (
-                f"the scale below 400 nm is unknown: no camera tells how bright "
-                f"{', '.join(unseen)} is; a spectrometer at the white reference would"
+            yield Undetermined(
+                "uv-unscaled",
+                "the scale below 400 nm is unknown: no camera determines how bright {leds} is; a "
+                "spectrometer at the white reference would",
+                leds=tuple(unseen),
             )
-            findings.append(LedFinding(LedFault.UNKNOWN_BRIGHTNESS, tuple(unseen), text))
         loose = [name for name, known in brightness.items() if known is None and name not in unseen]
         if loose:
-            text = (
-                f"the brightness of {', '.join(loose)} stays unknown: no value of the camera tells "
-                "it; a spectrometer would"
+            yield Unmeasured(
+                "light-unscaled",
+                "the brightness of {leds} stays unknown: no value of the camera determines it; a "
+                "spectrometer would",
+                leds=tuple(loose),
             )
-            findings.append(LedFinding(LedFault.UNKNOWN_BRIGHTNESS, tuple(loose), text))
         if comparison is not None and comparison.p_value < UNLIKELY:
-            text = (
+            yield Contradiction(
+                "camera-disagrees",
                 "camera and spectrometer disagree about the brightnesses by more than their σ (p = "
-                f"{comparison.p_value:.1g}), most for {comparison.worst}: are these the camera's "
-                "curves, and do both see the same white reference?"
+                "{p_value:.1g}), most for {leds}: are these the camera's curves, and do both see "
+                "the same white reference?",
+                p_value=comparison.p_value,
+                leds=(comparison.worst,),
             )
-            findings.append(LedFinding(LedFault.CAMERA_DISAGREES, (comparison.worst,), text))
         if self.drift is not None and abs(self.drift.value) > max(DRIFT, 3 * self.drift.sigma):
-            first = self.part.protocol.shuffled()[0]
-            text = (
-                f"LED '{first}' changed by {self.drift.value:+.1%} from the begin to the end of "
-                "the run; σ has it, but let the bench warm up, or look for something that was moved"
+            yield Disturbance(
+                "lamp-drifts",
+                "LED '{leds}' changed by {drift:+.1%} from the begin to the end of the run; σ has "
+                "it, but let the bench warm up, or look for something that was moved",
+                leds=(self.part.protocol.shuffled()[0],),
+                drift=self.drift.value,
             )
-            findings.append(LedFinding(LedFault.DRIFT, (first,), text))
-        return findings
 
     def _calibrated(
         self, number: int, led: LedLightMeasured, fit: BrightnessFit, brightness: Measured | None

@@ -8,9 +8,14 @@ import numpy as np
 from labrig.calibration import UV_NM
 from labrig.fit.leds import ChannelMatch, LedBand, light_within, match_channels
 from labrig.foundation.detection import DETECTION_SIGMA
+from labrig.foundation.result_warning import (
+    Contradiction,
+    Disturbance,
+    ResultWarning,
+    Unmeasured,
+)
 from labrig.optics import CameraResponse, Spectrum, Transmittance
 from labrig.protocols.led_brightness.analysis.readings import CameraValues, Spectrometry
-from labrig.protocols.led_brightness.result import LedFault, LedFinding
 
 #: Difference in nm from the rig file's peak that bins of makers and warmth do not explain.
 OFF_NM = 10.0
@@ -66,22 +71,18 @@ class Checked:
 
     Attributes
     ----------
-    findings
-        What was found amiss.
+    warnings
+        What is amiss; `leds` among their values are the LEDs that they concern.
     left_out
         LEDs that did not light as they should.
     without_camera, without_spectrometer
         LEDs whose values by the camera, and whose spectra, are not used.
     """
 
-    findings: list[LedFinding] = field(default_factory=list)
+    warnings: list[ResultWarning] = field(default_factory=list)
     left_out: set[str] = field(default_factory=set)
     without_camera: set[str] = field(default_factory=set)
     without_spectrometer: set[str] = field(default_factory=set)
-
-    def found(self, fault: LedFault, leds: Sequence[str], text: str) -> None:
-        """Add a finding."""
-        self.findings.append(LedFinding(fault, tuple(leds), text))
 
 
 def check_leds(
@@ -105,8 +106,13 @@ def check_leds(
     for name in planned:
         if name not in values:
             checked.left_out.add(name)
-            text = f"LED '{name}' was not measured: its unit is not complete; resume the run"
-            checked.found(LedFault.NOT_MEASURED, [name], text)
+            checked.warnings.append(
+                Unmeasured(
+                    "led-not-measured",
+                    "LED '{leds}' was not measured: its unit is not complete; resume the run",
+                    leds=(name,),
+                )
+            )
     _check_ambient(checked, values)
     _check_ranges(checked, values, spectra)
     for name in values:
@@ -118,12 +124,16 @@ def check_leds(
 
 def _check_ambient(checked: Checked, values: Mapping[str, CameraValues]) -> None:
     if ambient := [name for name, seen in values.items() if seen.is_ambient]:
-        most = max(float(values[name].off.max()) for name in ambient)
-        text = (
-            f"with all LEDs off there was light, after {_listed(ambient)} (up to {most:.3g} DN/s); "
-            "it was subtracted as if it had been steady: darken the room, see that no LED stays lit"
+        checked.warnings.append(
+            Disturbance(
+                "light-left",
+                "with all LEDs off there was light, after {leds} (up to {most_dn_per_s:.3g} DN/s); "
+                "it was subtracted as if it had been steady: darken the room, see that no LED "
+                "stays lit",
+                leds=tuple(ambient),
+                most_dn_per_s=max(float(values[name].off.max()) for name in ambient),
+            )
         )
-        checked.found(LedFault.AMBIENT_LIGHT, ambient, text)
 
 
 def _check_ranges(
@@ -131,26 +141,35 @@ def _check_ranges(
 ) -> None:
     if clipped := [name for name, seen in values.items() if seen.is_clipped]:
         checked.without_camera.update(clipped)
-        text = (
-            f"the camera's frames of {_listed(clipped)} are clipped even at the shortest exposure "
-            "and are left out; dim the LED, lower camera.iso or close the aperture"
+        checked.warnings.append(
+            Disturbance(
+                "light-clipped",
+                "the camera's frames of {leds} are clipped even at the shortest exposure and are "
+                "left out; dim the LED, lower camera.iso or close the aperture",
+                leds=tuple(clipped),
+            )
         )
-        checked.found(LedFault.CLIPPED, clipped, text)
     if bright := [name for name, seen in values.items() if seen.is_off_clipped]:
         checked.without_camera.update(bright)
-        text = (
-            f"with all LEDs off the camera's frames are clipped after {_listed(bright)}: an LED "
-            "stays lit, or another light is on; the camera's values are left out: check the LEDs' "
-            "relays, darken the room"
+        checked.warnings.append(
+            Disturbance(
+                "light-clipped-off",
+                "with all LEDs off the camera's frames are clipped after {leds}: an LED stays lit, "
+                "or another light is on; the camera's values are left out: check the LEDs' relays, "
+                "darken the room",
+                leds=tuple(bright),
+            )
         )
-        checked.found(LedFault.AMBIENT_LIGHT, bright, text)
     if saturated := [name for name, seen in spectra.items() if seen.is_saturated]:
         checked.without_spectrometer.update(saturated)
-        text = (
-            f"the spectrometer is saturated by {_listed(saturated)}, whose spectra are left out; "
-            "dim the LED or move the spectrometer's head away"
+        checked.warnings.append(
+            Disturbance(
+                "spectrometer-saturated",
+                "the spectrometer is saturated by {leds}, whose spectra are left out; dim the LED "
+                "or move the spectrometer's head away",
+                leds=tuple(saturated),
+            )
         )
-        checked.found(LedFault.SATURATED, saturated, text)
 
 
 def _check_lit(
@@ -162,28 +181,41 @@ def _check_lit(
         return
     if by_camera:
         checked.without_spectrometer.add(name)
-        text = (
-            f"the spectrometer saw nothing of LED '{name}', the camera did; is its head before "
-            "the white reference?"
+        checked.warnings.append(
+            Unmeasured(
+                "led-unseen",
+                "the spectrometer saw nothing of LED '{leds}', the camera did; is its head before "
+                "the white reference?",
+                leds=(name,),
+            )
         )
-        checked.found(LedFault.NOT_SEEN, [name], text)
         return
     checked.without_camera.add(name)
     if seen is None and bank.peak_nm(name) < UV_NM:
-        text = (
-            f"the camera sees nothing of LED '{name}', so that nothing tells whether it lit; look "
-            "at it through something that fluoresces"
+        checked.warnings.append(
+            Unmeasured(
+                "led-unseen",
+                "the camera sees nothing of LED '{leds}': nothing shows that it lit; look at it "
+                "through something that fluoresces",
+                leds=(name,),
+            )
         )
-        checked.found(LedFault.NOT_SEEN, [name], text)
         return
     checked.left_out.add(name)
-    text = f"LED '{name}' did not light and is left out; check its current, plug and output"
     if value.is_ambient or value.is_off_clipped:
-        text = (
-            f"LED '{name}' changes nothing, with all LEDs off it is as bright: it did not light or "
-            "stays lit, and is left out; check its plug, its output and its relay"
+        warning = Unmeasured(
+            "light-stays",
+            "LED '{leds}' changes nothing, with all LEDs off it is as bright: it did not light or "
+            "stays lit, and is left out; check its plug, its output and its relay",
+            leds=(name,),
         )
-    checked.found(LedFault.NOT_LIT, [name], text)
+    else:
+        warning = Unmeasured(
+            "light-unlit",
+            "LED '{leds}' did not light and is left out; check its current, plug and output",
+            leds=(name,),
+        )
+    checked.warnings.append(warning)
 
 
 def _check_spectra(checked: Checked, bank: Bank, spectra: Mapping[str, Spectrometry]) -> None:
@@ -199,18 +231,26 @@ def _check_spectra(checked: Checked, bank: Bank, spectra: Mapping[str, Spectrome
         if abs(off_nm) <= OFF_NM:
             continue
         if nearest != name and abs(band.centroid_nm - bank.peak_nm(nearest)) <= OFF_NM:
-            text = (
-                f"LED '{name}' shines like '{nearest}', about {band.centroid_nm:.0f} nm: LEDs are "
-                "connected in another order than the rig file names them; its measured spectrum "
-                "counts, correct the rig file"
+            warning = Contradiction(
+                "light-is-another",
+                "LED '{led}' shines like '{other}', about {centroid_nm:.0f} nm: LEDs are connected "
+                "in another order than the rig file names them; its measured spectrum counts, "
+                "correct the rig file",
+                led=name,
+                other=nearest,
+                centroid_nm=band.centroid_nm,
+                leds=(name, nearest),
             )
-            checked.found(LedFault.OTHER_LED, [name, nearest], text)
         else:
-            text = (
-                f"LED '{name}' shines about {band.centroid_nm:.0f} nm, {off_nm:+.0f} nm from what "
-                "the rig file says; its measured spectrum counts, correct the rig file"
+            warning = Contradiction(
+                "peak-differs",
+                "LED '{leds}' shines about {centroid_nm:.0f} nm, {off_nm:+.0f} nm from what the "
+                "rig file says; its measured spectrum counts, correct the rig file",
+                leds=(name,),
+                centroid_nm=band.centroid_nm,
+                off_nm=off_nm,
             )
-            checked.found(LedFault.OTHER_WAVELENGTH, [name], text)
+        checked.warnings.append(warning)
     fluorescent = {}
     lit_beside = {
         name: light for name, band in bands.items() if (light := _beside(band)) is not None
@@ -228,22 +268,35 @@ def _check_spectra(checked: Checked, bank: Bank, spectra: Mapping[str, Spectrome
             fluorescent[name] = part, centre_nm
         elif is_led and rms_nm <= _rms_nm(bank.nominal[nearest]) * WINGS + BIN_NM / 2:
             checked.left_out.add(name)
-            text = (
-                f"under LED '{name}' there is {part:.0%} as much light about {centre_nm:.0f} nm: "
-                f"LED '{nearest}' was lit at the same time; '{name}' is left out, check the outputs"
+            checked.warnings.append(
+                Disturbance(
+                    "two-lights",
+                    "under LED '{led}' there is {part:.0%} as much light about {centre_nm:.0f} nm: "
+                    "LED '{other}' was lit at the same time; '{led}' is left out, check the "
+                    "outputs",
+                    led=name,
+                    other=nearest,
+                    part=part,
+                    centre_nm=centre_nm,
+                    leds=(name, nearest),
+                )
             )
-            checked.found(LedFault.TWO_LIT, [name, nearest], text)
         elif name in short:
             fluorescent[name] = part, centre_nm
     if fluorescent:
         checked.without_camera.update(fluorescent)
         part, centre_nm = max(fluorescent.values())
-        text = (
-            f"the white reference fluoresces: under {_listed(list(fluorescent))} it sends out "
-            f"up to {part:.1%} as much light about {centre_nm:.0f} nm; the camera's values under "
-            "these LEDs are left out: take a reference of PTFE or barium sulphate"
+        checked.warnings.append(
+            Disturbance(
+                "reference-fluoresces",
+                "the white reference fluoresces: under {leds} it sends out up to {part:.1%} as "
+                "much light about {centre_nm:.0f} nm; the camera's values under these LEDs are "
+                "left out: take a reference of PTFE or barium sulphate",
+                leds=tuple(fluorescent),
+                part=part,
+                centre_nm=centre_nm,
+            )
         )
-        checked.found(LedFault.FLUORESCENT_REFERENCE, list(fluorescent), text)
 
 
 def _beside(band: LedBand) -> tuple[float, float, float] | None:
@@ -295,35 +348,47 @@ def _check_channels(
     unexplained = [name for name in short if name in odd and name not in swapped]
     if unexplained and len(unexplained) > len(odd) / 2 and _is_redder(bank, values, unexplained):
         checked.without_camera.update(unexplained)
-        text = (
-            f"the white reference seems to fluoresce: under {_listed(unexplained)} channels of "
-            "longer wavelengths see more than the LEDs' light explains; these values are left out: "
-            "take a reference of PTFE or barium sulphate"
+        checked.warnings.append(
+            Disturbance(
+                "reference-fluoresces",
+                "the white reference seems to fluoresce: under {leds} channels of longer "
+                "wavelengths see more than the LEDs' light explains; these values are left out: "
+                "take a reference of PTFE or barium sulphate",
+                leds=tuple(unexplained),
+            )
         )
-        checked.found(LedFault.FLUORESCENT_REFERENCE, unexplained, text)
     for name, match in odd.items():
         if name in checked.without_camera:
             continue
+        warning: ResultWarning
         checked.left_out.add(name)
         other = swapped.get(name)
         if other is not None:
-            text = (
-                f"LED '{name}' shines like '{other}': LEDs are connected in another order than the "
-                f"rig file names them; '{name}' is left out, correct the rig file"
+            warning = Contradiction(
+                "light-is-another",
+                "LED '{led}' shines like '{other}': LEDs are connected in another order than the "
+                "rig file names them; '{led}' is left out, correct the rig file",
+                led=name,
+                other=other,
+                leds=(name, other),
             )
-            checked.found(LedFault.OTHER_LED, [name, other], text)
         elif match.pair is not None:
-            text = (
-                f"under LED '{name}' the camera's channels see '{match.pair}', too: two were lit "
-                f"at the same time; '{name}' is left out, check the outputs"
+            warning = Disturbance(
+                "two-lights",
+                "under LED '{led}' the camera's channels see '{other}', too: two were lit at the "
+                "same time; '{led}' is left out, check the outputs",
+                led=name,
+                other=match.pair,
+                leds=(name, match.pair),
             )
-            checked.found(LedFault.TWO_LIT, [name, match.pair], text)
         else:
-            text = (
-                f"the camera's channel ratios under LED '{name}' are those of no LED of the rig "
-                "file; it is left out: correct its 'centre' and 'fwhm'"
+            warning = Contradiction(
+                "light-colour-differs",
+                "the camera's channel ratios under LED '{leds}' are those of no LED of the rig "
+                "file; it is left out: correct its 'centre' and 'fwhm'",
+                leds=(name,),
             )
-            checked.found(LedFault.OTHER_WAVELENGTH, [name], text)
+        checked.warnings.append(warning)
 
 
 def _is_redder(bank: Bank, values: Mapping[str, CameraValues], names: Sequence[str]) -> bool:
@@ -363,7 +428,3 @@ def _rms_nm(spectrum: Spectrum) -> float:
     weight = spectrum.value * np.gradient(spectrum.wavelength_nm)
     centre = float(weight @ spectrum.wavelength_nm / weight.sum())
     return float(np.sqrt(weight @ (spectrum.wavelength_nm - centre) ** 2 / weight.sum()))
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names)

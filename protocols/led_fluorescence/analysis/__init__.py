@@ -36,6 +36,7 @@ from labrig.fit.fluorescence import (
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.material import appearance, read_emissions
 from labrig.optics import CameraResponse, Spectrum, Transmittance, delta_e, read_light
 from labrig.protocols.led_fluorescence.analysis.methods import (
@@ -106,7 +107,7 @@ def analyse(context: AnalysisContext) -> LedFluorescenceResult:
     direct = direct_measurement(context.rig)
     if direct is not None:
         warnings += missing_samples(direct, lit.samples)
-    patches = {}
+    patches, chosen = {}, {}
     for number, (name, sample) in enumerate(lit.samples.items()):
         even = sample.times(*_evenness(lit.cards[name], card, system))
         estimates = _Estimates(
@@ -115,11 +116,12 @@ def analyse(context: AnalysisContext) -> LedFluorescenceResult:
             method,
         )
         patches[name] = _patch(estimates, even, system, direct)
-        warnings += fact_warnings(name, estimates.chosen, camera.channels)
+        chosen[name] = estimates.chosen
         if method == "per-led":
             warnings += per_led_warnings(name, estimates.chosen)
         if lit.has_first:
             warnings += bleaching_warnings(name, even.bleaching)
+    warnings += fact_warnings(chosen, system.input_nm, camera.channels)
     return LedFluorescenceResult(
         leds=lit.used,
         led_peak_nm=lit.peak_nm,
@@ -160,7 +162,7 @@ class _Lit:
     cards: Mapping[str, LitPatch]
     samples: Mapping[str, LitPatch]
     has_first: bool
-    warnings: tuple[str, ...]
+    warnings: tuple[ResultWarning, ...]
 
 
 def _lit(
@@ -185,14 +187,17 @@ def _lit(
     if len(leds.by_row) < 2:
         raise DataError(
             f"expected two LEDs or more that can be used, got {len(leds.by_row)}: "
-            f"{'; '.join(leds.left_out)}"
+            f"{'; '.join(map(str, leds.left_out))}"
         )
-    warnings = [*leds.warnings, *lamps.warnings]
+    warnings: list[ResultWarning] = [*leds.warnings, *lamps.warnings]
     if context.rig.optics.may_see_gloss:
         warnings.append(
-            f"at {context.rig.optics.geometry_text} a surface's gloss reaches the "
-            "camera, and is in "
-            "the reflectance: light from 45°, or cross polarisers"
+            Disturbance(
+                "gloss-in-reflectance",
+                "at {geometry} a surface's gloss reaches the camera, and is in the reflectance: "
+                "light from 45°, or cross polarisers",
+                geometry=context.rig.optics.geometry_text,
+            )
         )
     kind: LightKind = "light" if context.protocol.lamps else "LED"
     for what, patches in (("card", cards), ("samples", samples)):

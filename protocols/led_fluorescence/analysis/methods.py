@@ -12,6 +12,7 @@ from labrig.fit import fit_mixture
 from labrig.fit.fluorescence import FluorescenceFit
 from labrig.foundation.arrays import BoolArray, FloatArray
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import ResultWarning, Unmeasured
 from labrig.material import ReradiationMatrix, compare_colours
 from labrig.optics import Spectrum, edges_from_centres, read_light
 from labrig.results import (
@@ -150,13 +151,18 @@ def direct_measurement(rig: RigFile) -> DirectMeasurement | None:
     return direct
 
 
-def missing_samples(direct: DirectMeasurement, names: Iterable[str]) -> list[str]:
+def missing_samples(direct: DirectMeasurement, names: Iterable[str]) -> list[ResultWarning]:
     """Return a warning if no sample was measured directly under the name of a patch."""
     if any(name in direct.samples for name in names):
         return []
     return [
-        f"optics: direct: no sample is called {' or '.join(names)}; it has "
-        f"{', '.join(direct.samples)}, and nothing is compared"
+        Unmeasured(
+            "sample-not-measured-directly",
+            "no sample is called {asked}; it has {samples}, and nothing is compared",
+            subject="optics: direct",
+            asked=" or ".join(names),
+            samples=tuple(direct.samples),
+        )
     ]
 
 

@@ -34,6 +34,7 @@ from labrig.fit import fit_luminance
 from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
+from labrig.foundation.result_warning import Disturbance, ResultWarning, Undetermined, Unmeasured
 from labrig.optics import mesopic_adaptation, mesopic_ratio
 from labrig.protocols.luminance.analysis.colour_of_glow import (
     ColourScale,
@@ -96,21 +97,29 @@ def analyse(context: AnalysisContext) -> LuminanceResult:
         )
         for name, region in regions.items()
     }
-    patches, warnings = {}, [*timing_warnings(run, LuminanceFrames.GLOW), *stray]
+    patches: dict[str, PatchLuminance] = {}
+    warnings: list[ResultWarning] = [*timing_warnings(run, LuminanceFrames.GLOW), *stray]
     if not frames.dark:
         warnings.append(
-            "without dark frames the level without light is that of the files: its error, in no σ "
-            "here, grows towards the dim end"
+            Unmeasured(
+                "no-dark-frames",
+                "without dark frames the level without light is that of the files: its error, in "
+                "no σ here, grows towards the dim end",
+            )
         )
     camera = context.inputs[CAMERA_KIND]
     if camera is None or camera.glare is None:
         warnings += _veiled(frames, regions)
     for name, each in counts.items():
         if not _is_seen(each).any():
-            warnings.append(f"{name}: no glow was seen in this patch, which is left out")
+            warnings.append(
+                Undetermined(
+                    "no-glow", "no glow was seen in this patch, which is left out", subject=name
+                )
+            )
             continue
-        patches[name], told = _patch(each, name, excitation, context)
-        warnings += [f"{name}: {line}" if len(counts) > 1 else line for line in told]
+        patches[name], of_patch = _patch(each, name, excitation, context)
+        warnings += [each.about(name if len(counts) > 1 else "") for each in of_patch]
     if not patches:
         raise DataError(
             f"{run.folder}: no glow was seen; raise iso_at_most, open the aperture, or excite for "
@@ -128,7 +137,7 @@ def analyse(context: AnalysisContext) -> LuminanceResult:
 
 def _patch(
     counts: GlowRatios, name: str, excitation: ExcitationState, context: AnalysisContext
-) -> tuple[PatchLuminance, list[str]]:
+) -> tuple[PatchLuminance, list[ResultWarning]]:
     """Return the luminances of a patch, and doubts about them."""
     rig, protocol = context.rig, context.protocol
     camera = camera_curves(rig, context.overrides.camera, context.inputs[LVF_KIND])
@@ -206,7 +215,7 @@ def _colour(counts: GlowRatios, rows: IntArray) -> tuple[FloatArray, FloatArray]
     return (weight * relative).sum(axis=0) / total, noise
 
 
-def _other_light(counts: GlowRatios) -> Iterator[str]:
+def _other_light(counts: GlowRatios) -> Iterator[ResultWarning]:
     """Yield a warning if the light changes its colour or stays at a level, as other light does."""
     halves = np.log(counts.t_s) > np.log(counts.t_s[[0, -1]]).mean()
     seen = _is_seen(counts).all(axis=1)
@@ -218,22 +227,25 @@ def _other_light(counts: GlowRatios) -> Iterator[str]:
             np.hypot(first_sigma, last_sigma),
         )
         if (change > np.maximum(COLOUR_SIGMAS * sigma, COLOUR_CHANGE)).any():
-            yield (
-                f"the colour of the glow changes by {change.max():.1%} with time: another light "
-                "came on, the lamp glows on, or the emission depends on time; the luminances take "
-                "it for the same"
+            yield Disturbance(
+                "glow-colour-changes",
+                "the colour of the glow changes by {change:.1%} with time: another light came on, "
+                "the lamp glows on, or the emission depends on time; the luminances take it for "
+                "the same",
+                change=change.max(),
             )
     brightest = int(np.argmax(counts.ratio[0] * counts.card))
     signal = counts.ratio[:, brightest]
     half = int(np.argmin(np.abs(counts.t_s - counts.t_s[-1] / 2)))
     if counts.t_s[-1] > LINGERS_S and signal[-1] > LINGERS * signal[half] > 0:
-        yield (
+        yield Undetermined(
+            "slow-end",
             "at the end the luminance hardly falls: a light may have come on, or a state lives "
-            "much longer than the run"
+            "much longer than the run",
         )
 
 
-def _veiled(frames: IntactFrames, regions: Mapping[str, Region]) -> tuple[str, ...]:
+def _veiled(frames: IntactFrames, regions: Mapping[str, Region]) -> tuple[ResultWarning, ...]:
     """Return a warning if the glare of a usual lens matters beside a bright patch."""
     iso = frames.decay[-1].iso
     last = [frame for frame in frames.decay if frame.iso == iso][:1]
@@ -272,7 +284,9 @@ def _factors(
     yield ScaleFactor("colour: curves, lamp, emission", colour, scale.source, is_common=False)
 
 
-def _warnings(counts: GlowRatios, scale: ColourScale, context: AnalysisContext) -> Iterator[str]:
+def _warnings(
+    counts: GlowRatios, scale: ColourScale, context: AnalysisContext
+) -> Iterator[ResultWarning]:
     """Yield doubts about scale and darkness."""
     doubt = scale.card_doubt(counts.card, counts.card_sigma)
     if doubt is not None:
@@ -281,17 +295,21 @@ def _warnings(counts: GlowRatios, scale: ColourScale, context: AnalysisContext) 
         yield scale.doubt
     yield from _other_light(counts)
     if context.rig.optics.luminance is not None and context.rig.optics.luminance.lamp is None:
-        yield (
+        yield Unmeasured(
+            "lamp-unnamed",
             "the rig file does not say which lamp it has (optics: luminance: lamp): the same lux "
-            "of another lamp excite another glow"
+            "of another lamp excite another glow",
         )
     ambient = 1000 * counts.ambient.value * float(scale.weights.sum())
     sigma = 1000 * counts.ambient.sigma * float(scale.weights.sum())
     if ambient > max(AMBIENT_SIGMAS * sigma, AMBIENT * VISIBLE_MCD_PER_M2):
-        yield (
-            f"the sample's place was not dark before the excitation, {ambient:.2g} {MCD_PER_M2} or "
-            "more by the colour of the dark frames: a status LED, or an earlier glow; it is "
-            "subtracted as long as it stays the same: cover LEDs, let the sample rest"
+        yield Disturbance(
+            "not-dark-before",
+            "the sample's place was not dark before the excitation, {ambient_mcd_per_m2:.2g} "
+            "{unit} or more by the colour of the dark frames: a status LED, or an earlier glow; it "
+            "is subtracted as long as it stays the same: cover LEDs, let the sample rest",
+            ambient_mcd_per_m2=ambient,
+            unit=MCD_PER_M2,
         )
 
 

@@ -23,6 +23,7 @@ from labrig.fit.spectrum import (
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.named_files import is_path
+from labrig.foundation.result_warning import Contradiction, ResultWarning, Undetermined
 from labrig.material import Material, read_material
 from labrig.optics import (
     CameraResponse,
@@ -106,21 +107,21 @@ class ColourScale:
     expected_card: FloatArray
     card_errors: FloatArray
     has_ratios: bool
-    doubt: str | None
+    doubt: ResultWarning | None
 
-    def card_doubt(self, card: FloatArray, sigma: float) -> str | None:
-        """Return why the card's light is not that of the lamp; None if it is as expected."""
+    def card_doubt(self, card: FloatArray, sigma: float) -> ResultWarning | None:
+        """Return a warning if the card's light is not that of the lamp, None if it is."""
         if not self.has_ratios:
             return None
         logs = np.log(card / self.expected_card)
         if _probability(logs, self.card_errors, max(sigma, MIN_NOISE)) > DOUBTED:
             return None
-        off = np.exp(logs - logs[np.argmax(card)])
-        text = ", ".join(f"{factor:.2f}" for factor in off)
-        return (
-            f"the card under the lamp has another colour than the rig file's curves say (channels "
-            f"{text} of what is expected): another lamp than its spectrum, a card that fluoresces, "
-            "or another light; luminances may be wrong by as much"
+        return Contradiction(
+            "card-colour-differs",
+            "the card under the lamp has another colour than the rig file's curves say (channels "
+            "{ratios:.2f} of what is expected): another lamp than its spectrum, a card that "
+            "fluoresces, or another light; luminances may be wrong by as much",
+            ratios=tuple(np.exp(logs - logs[np.argmax(card)]).tolist()),
         )
 
 
@@ -230,11 +231,13 @@ def colour_scale(
         by_shape = shapes @ (step * scotopic_efficacy(nodes)) / dark - luminous
         ratio = dark / seen
         scotopic = Measured(ratio, ratio * float(np.linalg.norm(by_shape)))
-        doubt = None
+        doubt: ResultWarning | None = None
         if _probability(np.log(colour / expected), errors, float((noise / colour).max())) < DOUBTED:
-            doubt = (
-                f"the glow has another colour than the emission of {known.source}: name another "
-                "one under 'emission:', or none, which estimates it"
+            doubt = Contradiction(
+                "glow-colour-differs",
+                "the glow has another colour than the emission of {emission}: name another one "
+                "under 'emission:', or none, which estimates it",
+                emission=known.source,
             )
     else:
         hats = hat_functions(KNOTS_NM, nodes)
@@ -253,9 +256,11 @@ def colour_scale(
         sigma = float(photopic.std(ddof=1) / photopic.mean())
         source = "estimated from three channels"
         if sigma > OPEN:
-            doubt = (
-                f"three channels leave {sigma:.0%} of this glow's luminance open: measure its "
-                "emission with emission_spectrum, and name that run under 'emission:'"
+            doubt = Undetermined(
+                "luminance-by-channels",
+                "three channels leave {sigma:.0%} of this glow's luminance open: measure its "
+                "emission with emission_spectrum, and name that run under 'emission:'",
+                sigma=sigma,
             )
         ratios = dark_adapted / photopic
         scotopic = Measured(float(ratios.mean()), float(ratios.std(ddof=1)))

@@ -12,7 +12,8 @@ from labrig.calibration import LVF_KIND, ReflectanceFile
 from labrig.fit.reflectance import AlbedoFit, Luminescence, fit_albedo, unresolved
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError, UsageError
-from labrig.foundation.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus as plus_minus
+from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning
 from labrig.optics import Transmittance, band_means, edges_from_centres
 from labrig.protocols.reflectance.analysis.lit_strips import Arranged, PatchStrip, both_arranged
 from labrig.protocols.reflectance.result import MeasuredReflectance, ReflectanceResult
@@ -73,7 +74,7 @@ def analyse(context: AnalysisContext) -> ReflectanceResult:
     bench = _Bench(white, narrow, excited, card, _card_sigma(card))
     both = [patch for patch in white.patches if patch in narrow.patches]
     if not both:
-        raise DataError("; ".join((*white.refused, *narrow.refused)))
+        raise DataError("; ".join(map(str, (*white.refused, *narrow.refused))))
     patches, warnings = for_each_patch(both, lambda patch: _patch(patch, bench))
     run = context.run.name
     return ReflectanceResult(
@@ -94,7 +95,7 @@ def analyse(context: AnalysisContext) -> ReflectanceResult:
     )
 
 
-def _patch(patch: StripPatch, bench: _Bench) -> tuple[MeasuredReflectance, list[str]]:
+def _patch(patch: StripPatch, bench: _Bench) -> tuple[MeasuredReflectance, list[ResultWarning]]:
     """Return the patch's reflectance, and warnings."""
     white, narrow = bench.white.patches[patch], bench.narrow.patches[patch]
     try:
@@ -142,51 +143,64 @@ def _card_sigma(card: Transmittance) -> FloatArray:
     return np.asarray(sigma / card.at(WAVELENGTH_NM))
 
 
-def _drift_warnings(*arrangements: Arranged) -> Iterator[str]:
+def _drift_warnings(*arrangements: Arranged) -> Iterator[ResultWarning]:
     for one in arrangements:
         if abs(one.drift) > DRIFT + SIGMAS * FLICKER:
-            yield (
-                f"the card's light changed by {one.drift:+.1%} from before the sample to after it "
-                f"({one.name} light); let the lamp warm up for longer, or look for something that "
-                "was moved"
+            yield Disturbance(
+                "lamp-drifts",
+                "the card's light changed by {drift:+.1%} from before the sample to after it "
+                "({light} light); let the lamp warm up for longer, or look for something that was "
+                "moved",
+                drift=one.drift,
+                light=one.name,
             )
 
 
 def _warnings(
     patch: MeasuredReflectance, fit: AlbedoFit, card: Transmittance, narrow: PatchStrip
-) -> Iterator[str]:
+) -> Iterator[ResultWarning]:
     if patch.misfit > CONTRADICTION:
         colour = (
             "it fluoresces in another colour than it glows in"
             if narrow.strip.luminescence.any()
-            else "it fluoresces, and no glow tells in which colour"
+            else "it fluoresces, and no glow shows in which colour"
         )
-        yield (
-            f"the channels contradict one another (misfit {patch.misfit:.1f}): {colour}, or sample "
-            "and card did not lie alike, so that the albedo may be wrong by more than its σ; "
-            "measure with a cut-on filter before the lamp"
+        yield Contradiction(
+            "channels-contradict",
+            "the channels contradict one another (misfit {misfit:.1f}): {cause}, or sample and "
+            "card did not lie alike, so that the albedo may be wrong by more than its σ; measure "
+            "with a cut-on filter before the lamp",
+            misfit=patch.misfit,
+            cause=colour,
         )
     brightest = int(np.argmax(patch.albedo - SIGMAS * patch.albedo_sigma))
     if patch.albedo[brightest] - SIGMAS * patch.albedo_sigma[brightest] > BRIGHTEST:
-        yield (
-            f"an albedo of {patch.albedo[brightest]:.2f} at "
-            f"{patch.wavelength_nm[brightest]:.0f} nm is more than a white sends back: gloss "
-            "reaches the camera, or the card's curve is not that of this card; light the sample "
-            "from the side"
+        yield Contradiction(
+            "more-than-white",
+            "an albedo of {albedo:.2f} at {wavelength_nm:.0f} nm is more than a white sends back: "
+            "gloss reaches the camera, or the card's curve is not that of this card; light the "
+            "sample from the side",
+            albedo=patch.albedo[brightest],
+            wavelength_nm=patch.wavelength_nm[brightest],
         )
     prompt = patch.excess - patch.glow
     if fit.is_prompt and prompt.max() > SEEN:
         most = int(np.argmax(prompt))
-        yield (
-            f"prompt fluorescence: under the lamp up to {prompt[most]:.3f} of the light at "
-            f"{patch.wavelength_nm[most]:.0f} nm is neither reflection nor glow, so that its total "
-            "radiance factor holds for this lamp only; the albedo is without it"
+        yield Disturbance(
+            "prompt-fluorescence",
+            "prompt fluorescence: under the lamp up to {fraction:.3f} of the light at "
+            "{wavelength_nm:.0f} nm is neither reflection nor glow, so that its total radiance "
+            "factor holds for this lamp only; the albedo is without it",
+            fraction=prompt[most],
+            wavelength_nm=patch.wavelength_nm[most],
         )
     thrown = patch.thrown_back
     excess = float(np.abs(patch.albedo - card.at(patch.wavelength_nm)).max())
     if abs(thrown.value) > SIGMAS * thrown.sigma and abs(thrown.value) * excess > SEEN:
-        yield (
-            f"the filter on the sample throws {plus_minus(thrown.value, thrown.sigma)} of its "
-            "light back onto it, which a card of another brightness does not show; raise the "
-            "filter, or take a card about as bright as the sample"
+        yield Disturbance(
+            "filter-reflects",
+            "the filter on the sample throws {fraction.plus_minus} of its light back onto it, "
+            "which a card of another brightness does not show; raise the filter, or take a card "
+            "about as bright as the sample",
+            fraction=thrown,
         )

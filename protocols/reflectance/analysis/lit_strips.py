@@ -21,6 +21,7 @@ from labrig.fit.reflectance import (
 )
 from labrig.fit.spectrum import SpectralSystem
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.result_warning import ResultWarning
 from labrig.optics import CameraResponse, Lvf, Spectrum, Strip, Transmittance
 from labrig.protocols.reflectance.protocol import ReflectanceFrames
 from labrig.reduce import FLICKER, SensorLayout, SeriesFrame, region_values, sensor_layout
@@ -132,7 +133,7 @@ class Arranged:
 
     name: str
     patches: Mapping[StripPatch, PatchStrip]
-    refused: tuple[str, ...]
+    refused: tuple[ResultWarning, ...]
     drift: float
 
 
@@ -224,7 +225,7 @@ class _Seen:
     """All patches in one arrangement, reasons for others, and the drift of the card's light."""
 
     patches: Mapping[StripPatch, _SeenPatch]
-    refused: tuple[str, ...]
+    refused: tuple[ResultWarning, ...]
     drift: float
 
 

@@ -19,6 +19,7 @@ from labrig.bench_optics import (
 )
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
+from labrig.foundation.result_warning import Contradiction, ResultWarning
 from labrig.optics import CameraResponse, is_narrow
 from labrig.protocols.steps.led_scenes import CARD
 from labrig.protocols.validate_illuminants.analysis.colours import (
@@ -71,7 +72,8 @@ def analyse(context: AnalysisContext) -> ValidateIlluminantsResult:
     warnings += left_warnings("card", cards, names, "lamp")
     warnings += left_warnings("samples", samples, names, "lamp")
     if not usable.by_row:
-        raise DataError(f"expected a lamp that can be used, got none: {'; '.join(usable.left_out)}")
+        reasons = "; ".join(map(str, usable.left_out))
+        raise DataError(f"expected a lamp that can be used, got none: {reasons}")
     rows, used = list(usable.by_row), list(usable.by_row.values())
     cards = {name: card.under(rows).without_rest() for name, card in cards.items()}
     samples = {name: sample.under(rows).without_rest() for name, sample in samples.items()}
@@ -235,26 +237,34 @@ def _patch(
     )
 
 
-def _chart_warnings(colours: _Colours) -> Iterator[str]:
-    """Yield a line if what was taken for a colour chart has other colours."""
+def _chart_warnings(colours: _Colours) -> Iterator[ResultWarning]:
+    """Yield a warning if what was taken for a colour chart has other colours."""
     off = colours.chart_delta_e
     if off is not None and off[0] > ODD_CHART:
-        yield (
-            f"chart: its patches are {off[0]:.1f} off in ΔE2000 on average; it is no ColorChecker "
-            f"of 24 patches or unevenly lit, or '{colours.balance}' is not the rig file's lamp"
+        yield Contradiction(
+            "chart-unusual",
+            "its patches are {delta_e:.1f} off in ΔE2000 on average; it is no ColorChecker of 24 "
+            "patches or unevenly lit, or '{lamp}' is not the rig file's lamp",
+            subject="chart",
+            delta_e=off[0],
+            lamp=colours.balance,
         )
 
 
-def _verdict_warnings(lamps: Mapping[str, LampComparison]) -> Iterator[str]:
-    """Yield a line for each lamp under which photographs differ from their predictions."""
+def _verdict_warnings(lamps: Mapping[str, LampComparison]) -> Iterator[ResultWarning]:
+    """Yield a warning for each lamp under which photographs differ from their predictions."""
     for lamp, comparison in lamps.items():
         if comparison.verdict == "differs":
             patches = comparison.patches
             worst = max(patches, key=lambda name: float(np.abs(patches[name].pull).max()))
-            yield (
-                f"{lamp}: photographs differ from their predictions by more than their errors "
-                f"(mean χ² per channel {comparison.reduced_chi2:.1f}); most does {worst}, by "
-                f"{abs(comparison.largest_pull):.1f} σ"
+            yield Contradiction(
+                "photographs-differ",
+                "photographs differ from their predictions by more than their errors (mean χ² per "
+                "channel {reduced_chi2:.1f}); most does {worst}, by {most_sigmas:.1f} σ",
+                subject=lamp,
+                reduced_chi2=comparison.reduced_chi2,
+                worst=worst,
+                most_sigmas=abs(comparison.largest_pull),
             )
 
 

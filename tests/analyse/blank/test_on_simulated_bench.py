@@ -19,6 +19,7 @@ from labrig.record import read_run
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.analyse.small_runs import BLANK
 from tests.results.made import assert_read_back
+from tests.warned import codes, of_code
 
 
 def without_door(rig: dict[str, Any]) -> None:
@@ -65,13 +66,13 @@ def test_a_leak_is_found_and_reported_and_a_decay_is_warned(tmp_path: Path) -> N
     assert blank.ambient_dn_per_s[green] > 10 * blank.ambient_sigma_dn_per_s[green]
     # Dark frames hold it, too: nothing is left once they are subtracted.
     assert abs(blank.constant_dn_per_s[green]) < 4 * blank.constant_sigma_dn_per_s[green]
-    assert any("all the time: find where it leaks in" in said for said in result.warnings)
+    assert of_code(result.warnings, "stray-light").values["occasion"] == "all the time"
 
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "40 s",
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
     run = record(tmp_path / "decay", decay)
     found = decay_analysis.analyse(part_of(run, Inputs({"blank": blank})))
-    assert any("all the time" in said for said in found.warnings)
+    assert of_code(found.warnings, "stray-light").values["occasion"] == "all the time"
 
 
 def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
@@ -81,7 +82,7 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     result = process_run(run)
     blank = BLANK_KIND.read(run / "result" / "blank.yaml")
     assert blank.first_clean_s is None
-    assert any("still gets darker at its end" in said for said in result.warnings)
+    assert "blank-still-fades" in codes(result.warnings)
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "20 s",
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
     decayed = record(tmp_path / "decay", decay)
@@ -93,7 +94,7 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     found = decay_analysis.analyse(part_of(decayed, Inputs({"blank": ends})))
     (patch,) = found.patches.values()
     assert list(patch.series.usable[:4]) == [False, False, True, True]
-    assert any("before the bench is dark are left out, 2 of" in said for said in found.warnings)
+    assert of_code(found.warnings, "frames-before-dark").values["left_out"] == 2
     rate = np.array(blank.rate_dn_per_s)[:, 1]
     assert rate[1] > rate[-1]
 

@@ -22,6 +22,7 @@ from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
 from tests.analyse.recorded import cut_off_and_resumed, part_of, processed_once, record
 from tests.analyse.small_runs import CAMERA_CALIBRATION, unlike_the_model
 from tests.results.made import assert_read_back
+from tests.warned import codes
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +70,7 @@ def test_gain_and_read_noise_are_the_sensors(camera: CameraFile) -> None:
 
 def test_shared_charge_is_seen(result: CameraCalibrationResult) -> None:
     assert any(one.neighbours_share_noise for one in result.photon_transfers)
-    assert any("neighbouring pixels share noise" in warning for warning in result.warnings)
+    assert "pixels-share-noise" in codes(result.warnings)
 
 
 def test_flicker_is_the_rooms_and_not_the_lamps_drift(
@@ -106,7 +107,7 @@ def test_the_sensor_is_linear_until_pixels_are_full(
     assert len(below) >= 4
     assert all(abs(value) < 4 * sigma for value, sigma in below)
     assert camera.linearity.saturation_dn == pytest.approx(15_600 - 1024)
-    assert any("off a straight line" in warning for warning in result.warnings)
+    assert "sensor-nonlinear" in codes(result.warnings)
 
 
 def test_the_flat_field_is_the_lenss(camera: CameraFile) -> None:

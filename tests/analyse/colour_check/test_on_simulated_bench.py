@@ -18,6 +18,7 @@ from tests.analyse.chart_bench import record, with_camera
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import COLOUR_CHECK, with_known_camera
 from tests.results.made import assert_read_back
+from tests.warned import codes
 
 
 def with_optics(context: AnalysisContext, **changed: str) -> AnalysisContext:
@@ -52,21 +53,21 @@ def test_colours_are_right_end_to_end(run: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("optics", "said"),
+    ("optics", "code"),
     [
-        ({"lamp": "xenon_projector"}, "the lamp's spectrum or the camera's curves are not"),
+        ({"lamp": "xenon_projector"}, "card-colour-differs"),
         pytest.param(
             {"camera": "nikon_d850"},
-            "or the filter is not as it was calibrated",
+            "card-through-filter",
             marks=pytest.mark.campaign,
         ),
     ],
 )
 def test_a_wrong_lamp_and_wrong_curves_are_noticed(
-    run: Path, optics: dict[str, str], said: str
+    run: Path, optics: dict[str, str], code: str
 ) -> None:
     result = analyse(with_optics(part_of(run), **optics))
-    assert any(said in line for line in result.warnings)
+    assert code in codes(result.warnings)
     assert result.card_misfit is not None
     assert result.card_misfit > 2
 
@@ -82,7 +83,7 @@ def test_a_filter_that_was_moved_is_noticed(run: Path) -> None:
     before = calibrated.model_copy(update={"before_camera": strip.model_copy(update=ends)})
     result = analyse(replace(part, inputs=Inputs({**part.inputs.provided, "lvf": before})))
     assert result.filter_shift_nm == pytest.approx(0.02 / 0.88 * 324, abs=2)
-    assert any("nm along itself from where it was calibrated" in line for line in result.warnings)
+    assert "strip-shifted" in codes(result.warnings)
 
 
 @pytest.mark.campaign

@@ -1,6 +1,6 @@
 """The fade and rise of the simulated lamp, a filament whose heat capacity changes as it cools."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.acquire import Plan, RunObserver
+from labrig.acquire import PlanClock, RunObserver
 from labrig.calibration import FADE_KIND, Change, FadeFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.clock import Clock
@@ -22,6 +22,7 @@ from tests.acquire.fakes import Watching
 from tests.analyse.recorded import cut_off_and_resumed, processed_once, record
 from tests.analyse.small_runs import FADE
 from tests.results.made import assert_read_back
+from tests.warned import codes
 
 #: Of a photograph, relative.
 FLICKER = 0.007
@@ -117,7 +118,7 @@ def test_what_glows_after_the_lamp_is_no_glowing_bodys(tmp_path: Path) -> None:
 
     protocol = FADE | {"warming": False, "rise": False, "every": "80 ms"}
     result: Any = process_run(record(tmp_path, protocol, afterglow))
-    assert any("is not that of a glowing body" in warning for warning in result.warnings)
+    assert "lamp-not-glowing-body" in codes(result.warnings)
 
 
 def test_the_light_of_a_frame_has_all_that_scatters_from_one_to_the_next(
@@ -194,7 +195,7 @@ class Busy(Watching):
 
 def test_what_began_late_is_photographed_again(run: Path, tmp_path: Path) -> None:
     @contextmanager
-    def busy(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    def busy(plan_clock: PlanClock, clock: Clock) -> Iterator[RunObserver]:
         yield Busy(clock)
 
     again = read_run(record(tmp_path, FADE | {"warming": False}, watch=busy))

@@ -29,6 +29,7 @@ from labrig.results import FluorescentPatch
 from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of, processed_once
 from tests.results.made import assert_read_back
+from tests.warned import codes, of_code
 
 
 def true_matrix(patch: str) -> ReradiationMatrix:
@@ -96,7 +97,9 @@ def test_what_ultraviolet_excites_has_no_scale_and_is_said(result: LedFluorescen
     depends = {colour.light: colour.depends_on_uv for colour in paper.colours}
     assert depends == {"D65": True, "A": True, "FL2": False}
     assert not any(colour.depends_on_uv for colour in felt.colours)
-    assert any("365 nm" in warning and "not known" in warning for warning in result.warnings)
+    unscaled = of_code(result.warnings, "light-unscaled")
+    assert unscaled.values["lights"] == ("365 nm",)
+    assert "paper" in unscaled.subject
 
 
 def test_nothing_bleaches_or_is_left_without_a_cause(result: LedFluorescenceResult) -> None:
@@ -104,7 +107,7 @@ def test_nothing_bleaches_or_is_left_without_a_cause(result: LedFluorescenceResu
         assert patch.bleaching is not None
         assert abs(patch.bleaching.value - 1) < 4 * patch.bleaching.sigma < 0.1
         assert patch.reduced_chi2 < 2
-    assert not any("left with all LEDs off" in warning for warning in result.warnings)
+    assert not {"light-left", "sample-bleached"} & set(codes(result.warnings))
 
 
 def test_the_result_is_read_back_and_written_as_materials(processed: Processed) -> None:
@@ -216,12 +219,13 @@ def _with(**simulation: Any) -> Callable[[dict[str, Any]], None]:
 
 def _result(folder: Path, change: Callable[[dict[str, Any]], None]) -> LedFluorescenceResult:
     result = analyse(part_of(record(folder, FEW, change)))
-    assert not any("\n" in line for line in result.warnings)
+    assert not any("\n" in str(each) for each in result.warnings)
     return result
 
 
-def _said(result: LedFluorescenceResult, what: str) -> bool:
-    return sum(what in line for line in result.warnings) == 1
+def _named(result: LedFluorescenceResult, code: str) -> tuple[str, dict[str, Any]]:
+    warning = of_code(result.warnings, code)
+    return warning.subject, dict(warning.values)
 
 
 def _is_felt(result: LedFluorescenceResult) -> bool:
@@ -240,7 +244,8 @@ def test_an_led_that_does_not_light_is_left_out_and_named(
 ) -> None:
     result = _result(tmp_path, _with(faults=[{"led_dark": {"relay": 4, "at": begin}}]))
     assert result.leds == ("430 nm", "455 nm", "530 nm")
-    assert _said(result, f"625 nm: left out, frames of the {seen_on} are dark")
+    subject, values = _named(result, "light-unlit")
+    assert (subject, values["target"]) == ("625 nm", seen_on)
     assert _is_felt(result)
 
 
@@ -265,7 +270,7 @@ def test_the_thesis_method_that_was_asked_for_stands_before_that_of_all_leds(
 def test_leds_in_another_order_count_as_what_they_are(tmp_path: Path) -> None:
     result = _result(tmp_path, _on_relays(RELAYS | {"455 nm": 3, "530 nm": 2}))
     assert result.leds == tuple(RELAYS)
-    assert _said(result, "455 nm, 530 nm: expected LEDs in the order of their names, got others")
+    assert _named(result, "lights-exchanged")[0] == "455 nm, 530 nm"
     assert _is_felt(result)
 
 
@@ -288,7 +293,8 @@ def test_an_led_that_clips_is_left_out(tmp_path: Path) -> None:
     run = record(tmp_path, FEW | {"camera": {"iso": 1600}}, bright)
     result = analyse(part_of(run))
     assert result.leds == ("430 nm", "455 nm", "625 nm")
-    assert _said(result, "530 nm: left out, frames of the card clip at the shortest exposure")
+    subject, values = _named(result, "light-clipped")
+    assert (subject, values["target"]) == ("530 nm", "card")
     assert _is_felt(result)
 
 
@@ -298,7 +304,7 @@ def test_light_that_leaks_in_is_subtracted(tmp_path: Path) -> None:
         rig["simulation"]["faults"] = [{"ambient_light": {"level": "0.5 %", "at": "3 min"}}]
 
     result = _result(tmp_path, leaking)
-    assert _said(result, "samples: with all LEDs off there was light after")
+    assert _named(result, "light-left")[0] == "samples"
     felt = result.patches["felt"]
     assert not felt.dyes
     true = true_matrix("felt").reflectance[5:30]
@@ -327,7 +333,8 @@ def test_lamps_join_the_estimate_and_leave_one_led_by_itself_alone(tmp_path: Pat
     assert "LED or lamp" in done.report.read_text()
     assert result.leds == ("430 nm", "455 nm", "530 nm", "625 nm", "halogen")
     assert result.lamps == ("halogen",)
-    assert all("and 400 nm where no LED" not in line for line in result.warnings), "lamps tell sums"
+    gaps_nm = of_code(result.warnings, "excitation-extrapolated").values["gaps_nm"]
+    assert not [gap for gap in gaps_nm if gap.endswith("400")], "lamps tell sums"
     yellow, felt = result.patches["yellow"], result.patches["felt"]
     assert yellow.value.shape == (5, 3)
     assert len(yellow.dyes) == 1
@@ -353,5 +360,6 @@ def test_a_lamp_that_does_not_light_is_left_out_and_the_leds_go_on(tmp_path: Pat
     asked = FEW | {"lamps": ["halogen"]}
     result = analyse(part_of(record(tmp_path, asked, unplugged)))
     assert result.leds == ("430 nm", "455 nm", "530 nm", "625 nm")
-    assert _said(result, "halogen: left out, frames of the card are dark; the lamp did not light")
+    subject, values = _named(result, "light-unlit")
+    assert (subject, values["target"]) == ("halogen", "card")
     assert _is_felt(result)

@@ -13,7 +13,7 @@ from labrig.protocols.lvf_calibration.analysis import (
     Bench,
     FilterScenes,
     fit_bands,
-    left_out_text,
+    left_out_warning,
     misfits,
     residuals,
 )
@@ -93,18 +93,19 @@ def test_a_filter_that_was_skipped_is_named(really: Transmittance) -> None:
     (wrong,) = (one for one in misfits(scenes(long_570=really), BENCH, TRUE_MAP) if one.left_out)
     assert (wrong.name, wrong.like) == ("long-570", really.name)
     assert wrong.own > 3 * wrong.best
-    said = left_out_text(wrong)
-    assert said.startswith("colour filter long-570: its picture is off its transmittance by 0.")
+    said = left_out_warning(wrong)
+    assert said.subject == "colour filter long-570"
+    assert said.values["rms"] == wrong.own
     like = "no filter" if really is NO_FILTER else really.name
-    assert f"it looks like {like} (" in said
-    assert "\n" not in said
+    assert said.values["likeness"].startswith(f"it looks like {like} (")
+    assert "\n" not in str(said)
 
 
 def test_a_filter_whose_file_is_of_another_one_is_named() -> None:
     unknown = Transmittance("unknown", np.array([380.0, 780.0]), np.array([0.6, 0.3]))
     (wrong,) = (one for one in misfits(scenes(short_550=unknown), BENCH, TRUE_MAP) if one.left_out)
     assert wrong.name == "short-550"
-    assert "none of the others" in left_out_text(wrong)
+    assert "none of the others" in str(left_out_warning(wrong))
 
 
 def test_what_clips_everywhere_is_left_out() -> None:

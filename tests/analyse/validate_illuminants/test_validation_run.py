@@ -19,6 +19,7 @@ from tests.analyse.led_bench import QUICK, SAMPLES, record
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import VALIDATE_ONE
 from tests.results.made import assert_read_back
+from tests.warned import of_code
 
 VALIDATE: dict[str, Any] = {
     "protocol": "validate_illuminants",
@@ -107,14 +108,15 @@ def test_another_matrix_differs_and_is_named(run: Path) -> None:
     result = analyse(asked_anew(part_of(run), wrong))
     for lamp in ("daylight", "halogen", "xenon"):
         assert result.lamps[lamp].verdict == "differs"
-        assert any(f"{lamp}: photo" in line and "does felt" in line for line in result.warnings)
+        (differs,) = (w for w in result.warnings if w.subject == lamp)
+        assert (differs.code, differs.values["worst"]) == ("photographs-differ", "felt")
 
 
 def test_a_lamp_that_does_not_light_is_left_out_and_named(tmp_path: Path) -> None:
     two = VALIDATE_ONE | {"lamps": ["daylight", "halogen"]}
     result = analyse(part_of(record(tmp_path, two, _with_relays({"halogen": 7}))))
     assert list(result.lamps) == ["daylight"]
-    assert any("halogen" in line and "lamp did not light" in line for line in result.warnings)
+    assert of_code(result.warnings, "light-unlit").subject == "halogen"
 
 
 def test_lamps_in_another_order_count_as_those_that_were_lit(run: Path) -> None:
@@ -127,9 +129,9 @@ def test_lamps_in_another_order_count_as_those_that_were_lit(run: Path) -> None:
     result = analyse(replace(part, rig=rig))
     assert list(result.lamps) == ["halogen", "daylight", "xenon", "ultraviolet"]
     assert {lamp.verdict for lamp in result.lamps.values()} == {"agrees"}
-    (line,) = result.warnings
-    assert "expected lamps in the order of their names" in line
-    assert "halogen for daylight" in line
+    (warning,) = result.warnings
+    assert warning.code == "lights-exchanged"
+    assert "halogen for daylight" in warning.values["exchanged"]
 
 
 @pytest.mark.campaign
@@ -138,9 +140,8 @@ def test_light_of_the_room_is_subtracted_and_said(tmp_path: Path) -> None:
         rig["simulation"]["faults"] = [{"ambient_light": {"level": "0.5 %", "at": "3 min"}}]
 
     result = analyse(part_of(record(tmp_path, VALIDATE_ONE, leaking)))
-    assert any(
-        "with all lamps off there was light after halogen" in line for line in result.warnings
-    )
+    left = [warning for warning in result.warnings if warning.code == "light-left"]
+    assert "halogen" in {each.values["lights"][0] for each in left}
     assert result.lamps["halogen"].verdict == "agrees"
 
 

@@ -1,4 +1,4 @@
-"""What no surface does is refused in one line, what few do is said."""
+"""A matrix that no surface has is refused in one line; one that few have gets a warning."""
 
 from dataclasses import replace
 
@@ -14,6 +14,7 @@ from tests.material.reradiation.synthetic import (
     YELLOW,
     measurement,
 )
+from tests.warned import of_code
 
 
 def bright(total: float, sigma: float | None = None) -> ReradiationMatrix:
@@ -45,11 +46,13 @@ def test_a_usual_sample_has_no_warnings() -> None:
 
 
 def test_more_than_a_perfect_white_is_said_with_its_wavelength() -> None:
-    (line,) = physical_warnings(bright(1.05))
-    assert (
-        line
-        == "1.050 of the light at 460 nm comes back from 'glow', more than from a perfect white"
-    )
+    (warning,) = physical_warnings(bright(1.05))
+    assert warning.code == "more-than-white"
+    assert warning.values == {
+        "fraction": pytest.approx(1.05),
+        "input_nm": pytest.approx(460),
+        "material": "glow",
+    }
 
 
 @pytest.mark.parametrize(("total", "sigma"), [(1.09, None), (1.12, 0.01), (1.39, 0.1)])
@@ -84,7 +87,9 @@ def test_a_sample_without_reflectance_is_judged_by_its_re_radiation() -> None:
 
 @pytest.mark.usefixtures("shared_data")
 def test_real_samples_pass_and_two_golf_balls_are_said() -> None:
-    said = {sample.name: physical_warnings(sample) for sample in bfc450.samples()}
-    assert len(said) == 97
-    assert {name for name, lines in said.items() if lines} == {"GOLF", "GOLFYE"}
-    assert said["GOLFYE"][0].startswith("1.068 of the light at 540 nm")
+    warnings = {sample.name: physical_warnings(sample) for sample in bfc450.samples()}
+    assert len(warnings) == 97
+    assert {name for name, each in warnings.items() if each} == {"GOLF", "GOLFYE"}
+    yellow = of_code(warnings["GOLFYE"], "more-than-white").values
+    assert yellow["fraction"] == pytest.approx(1.068, abs=0.0005)
+    assert yellow["input_nm"] == 540

@@ -1,0 +1,31 @@
+"""`labrig explain`: keys, codes of warnings and terms, by one name each."""
+
+import pytest
+
+from labrig.explain import explain
+from labrig.foundation.errors import UsageError
+
+
+def test_a_key_has_value_default_and_meaning_in_every_file_that_has_it() -> None:
+    places = {each.place: each for each in explain("every")}
+    decay = places["protocol file, protocol: decay"]
+    assert dict(decay.facts) == {"value": "duration with unit", "default": "5 s"}
+    assert "Time between the begins of two photographs" in decay.text
+    assert "protocol file, protocol: blank" in places
+
+
+def test_a_code_has_its_kind_and_its_sentence() -> None:
+    (late,) = explain("FRAMES-LATE")
+    assert (late.kind, late.place) == ("warning", "disturbance")
+    assert dict(late.facts)["sentence"].startswith("{count} frames began late, {latest}")
+
+
+def test_a_term_is_plain_text() -> None:
+    term = next(each for each in explain("amplitude") if each.kind == "term")
+    assert "Λ_i k_{r,i} r_i(0)" in term.text
+    assert not {"$", "`", "\\", "{term}"} & set(term.text)
+
+
+def test_an_unknown_name_has_a_near_one() -> None:
+    with pytest.raises(UsageError, match="did you mean 'every'"):
+        explain("evry")
