@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -120,9 +120,12 @@ class QueueEntry:
         """`waiting`, or the status of the run."""
         return WAITING if self.summary is None else self.summary.status
 
-    @property
-    def states(self) -> Iterator[FoundState]:
+    @cached_property
+    def states(self) -> tuple[FoundState, ...]:
         """States of the decays that the run found."""
+        return tuple(self._states())
+
+    def _states(self) -> Iterator[FoundState]:
         if self.summary is None:
             return
         for patch in self.summary.parameters:
@@ -135,13 +138,14 @@ class QueueEntry:
                     Measured(state.amplitude, state.amplitude_sigma),
                 )
 
-    @property
-    def luminances(self) -> Iterator[FoundLuminance]:
+    @cached_property
+    def luminances(self) -> tuple[FoundLuminance, ...]:
         """Luminances that the run found."""
-        if self.summary is not None and self.status == "processed":
-            yield from found_luminances(self.summary.folder)
+        if self.summary is None or self.status != "processed":
+            return ()
+        return tuple(found_luminances(self.summary.folder))
 
-    @property
+    @cached_property
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Warnings of the run's result."""
         if self.summary is None or self.status != "processed":
@@ -240,7 +244,7 @@ def _csv(listed: Sequence[QueueEntry]) -> str:
     """Return a line for each rate and luminance of each run, and one of a run that found none."""
     keys = _keys(listed)
     found = ["k_r_per_s", "k_r_sigma_per_s", "amplitude", "amplitude_sigma"]
-    luminous = any(True for entry in listed for _ in entry.luminances)
+    luminous = any(entry.luminances for entry in listed)
     light = ["t_s", "luminance_mcd_per_m2", "luminance_sigma_mcd_per_m2"] if luminous else []
     head = ["number", "protocol", *keys, "status", "run", "patch", "state", *found, *light]
     table: list[list[object]] = []

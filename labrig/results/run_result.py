@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
@@ -78,7 +79,7 @@ class RunResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `result.json`, in which infinity and NaN are texts."""
-        fields = TypeAdapter(type(self)).dump_python(self, mode="json")
+        fields = _adapter(type(self)).dump_python(self, mode="json")
         content: dict[str, Any] = finite(
             {
                 "kind": self.kind,
@@ -116,7 +117,14 @@ class RunResult:
                 f"a result of '{kind}', version {version}, not of '{cls.kind}', version "
                 f"{cls.schema_version}"
             )
-        return TypeAdapter(cls).validate_python(fields)
+        read: Self = _adapter(cls).validate_python(fields)
+        return read
+
+
+@cache
+def _adapter(result_type: type[RunResult]) -> TypeAdapter[Any]:
+    """Return the reader and writer of a type: to build it takes longer than to read a result."""
+    return TypeAdapter(result_type)
 
 
 def _to_own_type(content: Any) -> RunResult:

@@ -61,8 +61,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_chain_that_was_killed_and_resumed_ends_in_one_material(
     run: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Profiles of the rates are those of an excitation run by itself.
+    # Profiles of the rates, and a layer of the sample, are those of an excitation run by itself.
     monkeypatch.setattr("labrig.fit.excitation.fit.excitation_intervals", lambda *_: {})
+    monkeypatch.setattr("labrig.protocols.excitation.analysis.orders.layer_effect", lambda *_: None)
     processed = process_and_report(run)
     result = processed.result
     assert isinstance(result, PhosphorResult)

@@ -70,8 +70,9 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_each_sample_has_a_material_of_its_own(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # The profiles of both samples' rates take most of the time, and are those of a single one.
+    # Profiles of both samples' rates, and their layers, are those of a single one.
     monkeypatch.setattr("labrig.fit.excitation.fit.excitation_intervals", lambda *_: {})
+    monkeypatch.setattr("labrig.protocols.excitation.analysis.orders.layer_effect", lambda *_: None)
     result = analyse(part_of(run))
     assert_read_back(result)
     assert list(result.parts) == [
