@@ -117,11 +117,6 @@ class PlanClock:
         return min(self._at_s + elapsed_s, self.waits_at_s)
 
     @property
-    def since_s(self) -> float:
-        """Time at which the last step began; 0 before the first unit."""
-        return self._since_s or 0.0
-
-    @property
     def waits_at_s(self) -> float:
         """Position beyond which the clock does not go before the next step begins."""
         return max(self._until_s, self._at_s)

@@ -267,7 +267,7 @@ def with_white_reference(
             Unmeasured(
                 "white-picture-unused",
                 "the white picture is not used, since the spectra of lamp and grey card are not "
-                "known: name them in the rig file (optics: {{lamp: …, grey_card: …}})",
+                "known: name them in the rig file, as 'lamp' and 'grey_card' under 'optics'",
             ),
         )
     light = card_light(lamp_spectrum(context.rig), card_reflectance(context.rig))

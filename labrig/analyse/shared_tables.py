@@ -76,7 +76,12 @@ def fit_shared_tables(
         replace(decay, reference=by_clock(decay.reference, table.series.clock))
         for decay, table in zip(shared.tables, tables, strict=True)
     )
-    return replace(shared, tables=decays), tables
+    of_rows = (
+        warning.about(name)
+        for name, table in zip(_names(paths), tables, strict=True)
+        for warning in table.series.warnings
+    )
+    return replace(shared, tables=decays, warnings=(*of_rows, *shared.warnings)), tables
 
 
 def _only(path: Path, fitted: Sequence[FittedTable]) -> FittedTable:

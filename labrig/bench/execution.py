@@ -467,7 +467,7 @@ def _report_exchanged_camera(
 
 def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
     """Yield warnings about the journal of a resumed run, and frames that disagree with it."""
-    if record.torn:
+    if folder.was_torn:
         yield (
             f"{folder.path / JOURNAL}: its last line is incomplete, as a crash leaves it, and is "
             "not used"

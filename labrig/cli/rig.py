@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labrig.cli import default_rig, page
+from labrig.cli import default_rig, new_rig, page
 from labrig.cli.default_rig import RigArgument, rig_path
 from labrig.cli.detachable_stream import DetachableStream
 from labrig.foundation.errors import DeviceError, ProtocolError
@@ -85,6 +85,7 @@ def check(
     _raise_failures(report, path)
 
 
+app.command("new")(new_rig.new)
 app.command("view")(page.view)
 app.command("use")(default_rig.use)
 

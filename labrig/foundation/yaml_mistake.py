@@ -25,10 +25,21 @@ class Mark(Protocol):
 class MarkedError(Protocol):
     """The part of PyYAML's and libyaml's errors that is used."""
 
-    context: str | None
-    context_mark: Mark | None
-    problem: str | None
-    problem_mark: Mark | None
+    @property
+    def context(self) -> str | None:
+        """What the parser was at."""
+
+    @property
+    def context_mark(self) -> Mark | None:
+        """Where that began."""
+
+    @property
+    def problem(self) -> str | None:
+        """What it could not go on from."""
+
+    @property
+    def problem_mark(self) -> Mark | None:
+        """Where it stopped."""
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,7 @@ from .lvf import (
     peak_shape as peak_shape,
     signal_through as signal_through,
 )
+from .oklab import from_oklab as from_oklab, oklab as oklab
 from .photometry import (
     absolute_irradiance as absolute_irradiance,
     mesopic_adaptation as mesopic_adaptation,

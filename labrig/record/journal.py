@@ -96,6 +96,11 @@ class Journal:
     disk
         Disk to which lines are written.
 
+    Attributes
+    ----------
+    was_torn
+        Whether the last line was incomplete as the journal was opened; it is cut off.
+
     Raises
     ------
     DiskError
@@ -108,6 +113,7 @@ class Journal:
         try:
             raw = read_bytes(path, MAX_JOURNAL_BYTES) if path.exists() else b""
             self._acknowledged = bytearray(raw[: raw.rfind(b"\n") + 1])
+            self.was_torn = len(self._acknowledged) < len(raw)
             *_, last, _ = [b"", *bytes(self._acknowledged).split(b"\n")]
             self._seal = _seal(last) if last else ""
             write_durably(path, bytes(self._acknowledged), disk)

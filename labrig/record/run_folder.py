@@ -260,6 +260,11 @@ class RunFolder:
         """Return the record of everything acknowledged so far, without access to the disk."""
         return run_record(self.path, self._journal.read())
 
+    @property
+    def was_torn(self) -> bool:
+        """Whether the last line of the journal was incomplete as the folder was opened."""
+        return self._journal.was_torn
+
     def unknown_files(self) -> list[str]:
         """Return the names of files among the frames that have no journal line, left by a crash."""
         recorded = {file.path.name for attempt in self.read().attempts for file in attempt.files}
@@ -274,7 +279,7 @@ class RunFolder:
         """
         recorded = [file.path.name for attempt in self.read().attempts for file in attempt.files]
         last = max(recorded, default="")
-        later = [name for name in self.unknown_files() if name > last]
+        later = [name for name in self.unknown_files() if name > last and not name.endswith(PART)]
         return later if len(later) > 1 else []
 
     def attempt(

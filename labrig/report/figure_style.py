@@ -97,6 +97,8 @@ INK, MUTED, RULE, PAPER, SHADE = "#1d2329", "#5f6b76", "#dde2e6", "#fefefe", "#e
 #: Colours of the channels R, G, B of a camera, and of other channels in turn.
 CHANNEL = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 OTHER_CHANNELS = ("#7a4fb5", "#b06a00", "#0f7f8a", "#a8326e", "#4f5b66")
+#: Lightness, chroma and hues in Oklab of the colours of a spectrum.
+SPECTRUM_LIGHTNESS, SPECTRUM_CHROMA, SPECTRUM_HUE_DEG = 0.62, 0.13, (310.0, 20.0)
 #: Marker of a value below an axis, its tip on the axis.
 CARET_DOWN: Literal[7] = 7
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
@@ -148,6 +150,30 @@ def figure_style() -> Iterator[None]:
 def channel_colour(name: str, number: int) -> str:
     """Return the colour of the channel `name`, whose index in its series is `number`."""
     return CHANNEL.get(name, OTHER_CHANNELS[number % len(OTHER_CHANNELS)])
+
+
+def spectral_colours(wavelength_nm: Sequence[float]) -> list[str]:
+    """Return a colour for each wavelength, by its place in the spectrum and all equally light.
+
+    Of one lightness they are readable on a light page as on a dark one; the hue goes from violet
+    at 360 nm to red at 700 nm.
+
+    Parameters
+    ----------
+    wavelength_nm
+        Wavelengths in nm; those beyond have the colour of the end.
+
+    Returns
+    -------
+    list of str
+        Colours as `#rrggbb`.
+    """
+    from labrig.optics import from_oklab, srgb_bytes
+
+    hue = np.radians(np.interp(wavelength_nm, (360.0, 700.0), SPECTRUM_HUE_DEG))
+    a, b = SPECTRUM_CHROMA * np.cos(hue), SPECTRUM_CHROMA * np.sin(hue)
+    lab = np.stack([np.full_like(hue, SPECTRUM_LIGHTNESS), a, b], axis=-1)
+    return ["#" + bytes(rgb).hex() for rgb in srgb_bytes(from_oklab(lab))]
 
 
 def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> "Figure":

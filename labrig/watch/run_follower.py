@@ -74,7 +74,7 @@ class Course:
         records.sort(key=lambda record: record.start_time)
         for record in records:
             clock.begin_step(_text_of(record), record.start_time)
-        time = clock.since_s
+        time = records[-1].start_time if records else began_time
         at_s = clock.at_s(time)
         past = [record for record in records if _device(record) != CHOICE]
         by_hand = clock.next_by_hand(time)

@@ -13,14 +13,13 @@ from labrig.report.figure_style import (
     INK,
     LEFT_PT,
     MUTED,
-    OTHER_CHANNELS,
     SHADE,
+    SMALL_PT,
     error_bars,
-    legend_above,
-    line_entry,
     new_figure,
     place,
     points,
+    spectral_colours,
 )
 from labrig.report.sections import Picture, Rendered, Section, Source, Table
 
@@ -73,7 +72,8 @@ def _section(result: IrradianceResult) -> Section:
             Picture(
                 "irradiance",
                 partial(_irradiance_figure, result),
-                f"{caption}; where it is less than 2 % of its highest, it is not drawn.",
+                f"{caption}, labelled by the band in nm; where it is less than 2 % of its highest, "
+                "it is not drawn.",
             ),
             Picture(
                 "scale",
@@ -94,22 +94,30 @@ def _irradiance_figure(result: IrradianceResult) -> Figure:
     """Draw the irradiance E of every band along the strip, or by every light."""
     file = result.calibration
     figure = new_figure(240)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
     through, sigma = np.array(file.through), np.array(file.through_sigma)
     position = result.centre_nm if file.lights else np.array(file.position)
-    entries = []
-    for band, (low, high) in enumerate(zip(file.bands_nm[:-1], file.bands_nm[1:], strict=True)):
-        colour = OTHER_CHANNELS[band % len(OTHER_CHANNELS)]
+    edges_nm = np.array(file.bands_nm)
+    colours = spectral_colours((edges_nm[:-1] + edges_nm[1:]) / 2)
+    for band, colour in enumerate(colours):
         drawn = through[:, band] > 0.02 * through[:, band].max()
         error_bars(axes, position[drawn], through[drawn, band], sigma[drawn, band], colour)
         axes.plot(position[drawn], through[drawn, band], color=colour, linewidth=1.0)
-        entries.append(line_entry(f"{low:.0f}–{high:.0f} nm", colour))
-    axes.set_ylim(0, None)
+        peak = int(np.argmax(through[:, band]))
+        axes.annotate(
+            f"{edges_nm[band]:.0f}–\n{edges_nm[band + 1]:.0f}",
+            (position[peak], through[peak, band]),
+            (0, 5),
+            textcoords="offset points",
+            ha="center",
+            fontsize=SMALL_PT - 1,
+            color=colour,
+        )
+    axes.set_ylim(0, 1.2 * float(through.max()))
     axes.set_xlabel(
         "Mean wavelength of the light / nm" if file.lights else "Position from blue end to red end"
     )
     axes.set_ylabel("Irradiance E")
-    legend_above(figure, entries, columns=4)
     return figure
 
 

@@ -167,13 +167,14 @@ def main() -> None:
 
 def _row(name: str, n_cuts: int, late: Sequence[Sequence[float]]) -> str:
     cells = [
-        f"{min(each):+.1f} to {max(each):+.1f}, "
-        f"{sum(abs(s) < LARGEST_S for s in each)} of {len(each)}"
-        if each
-        else "none"
+        f"{min(each):+.1f} to {max(each):+.1f}, {_near(each)} of {len(each)}" if each else "none"
         for each in late
     ]
     return f"{name:19}{n_cuts:5}  {cells[0]:33}{cells[1]:37}{cells[2]}"
+
+
+def _near(late_s: Sequence[float]) -> int:
+    return sum(abs(each_s) < LARGEST_S for each_s in late_s)
 
 
 if __name__ == "__main__":

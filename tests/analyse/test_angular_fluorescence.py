@@ -192,7 +192,7 @@ def test_a_region_that_cuts_the_outline_is_named_and_no_dependence(
     reradiated, _ = result.spheres
     assert reradiated.circles == pytest.approx(np.array([[180.0, 120.0, 90.0]] * 4), abs=1.0)
     assert result.p > 0.2
-    line = str(of_code(result.warnings, "outline-cut"))
+    line = next(str(each) for each in result.warnings if each.code == "outline-cut")
     for side, px in sides.items():
         named = re.search(rf"{side} by (\d+) px \((\d+)% of its radius\)", line)
         assert named is not None

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TextIO
 
 import pytest
@@ -22,7 +23,7 @@ from labrig.acquire import (
 )
 from labrig.bench import Recording
 from labrig.bench.found_calibrations import FoundCalibrations
-from labrig.cli.progress import Terminal, progress
+from labrig.cli.progress import MAX_AT_ONCE, Terminal, progress
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import UsageError
 from labrig.record import read_run
@@ -80,6 +81,37 @@ def test_an_input_that_has_ended_is_reported(typed: TextIO) -> None:
 
 
 def test_ctrl_c_is_answered_while_nobody_types(typed: TextIO) -> None:
+    def stop() -> None:
+        raise Interrupted(2)
+
+    with pytest.raises(Interrupted):
+        Terminal().ask(STEP, None, 60.0, stop)
+
+
+def test_answers_without_end_neither_pile_up_nor_go_unsaid(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As of `yes "" | labrig run`: faster than any step."""
+
+    class Endless:
+        lines = 0
+
+        def readline(self) -> str:
+            self.lines += 1
+            return "\n"
+
+    source = Endless()
+    monkeypatch.setattr("sys.stdin", source)
+    terminal = Terminal()
+    for _ in range(MAX_AT_ONCE + 2):
+        assert terminal.ask(STEP, None, 60.0, nothing) == ""
+    assert source.lines < 10 * MAX_AT_ONCE
+    assert capfd.readouterr().err.count("no person does that") == 1
+
+
+def test_answers_without_end_do_not_keep_a_signal_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(readline=lambda: "undo\n"))
+
     def stop() -> None:
         raise Interrupted(2)
 

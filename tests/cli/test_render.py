@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from labrig.cli import under_way
 from labrig.foundation import colour_science
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.result_warning import as_warnings
@@ -160,6 +161,9 @@ def test_on_a_terminal_it_says_what_is_done_and_for_how_long(
     text = TerminalText()
     with monkeypatch.context() as on_terminal:
         on_terminal.setattr(sys, "stderr", text)
+        for patience in ("PATIENCE_S", "FORESEEN_S"):
+            on_terminal.setattr(under_way, patience, 0.0)
+        on_terminal.setattr(under_way, "PERIOD_S", 0.01)
         assert labrig("render", "cornell-box", *SMALL).code == 0
     shown = text.getvalue()
     for what in (
@@ -167,7 +171,7 @@ def test_on_a_terminal_it_says_what_is_done_and_for_how_long(
         "tracing paths of the picture",
         "charging and decay",
     ):
-        assert re.search(what + r".* \d+%.* left", shown), what
+        assert re.search(what + r".*, \d+ of 100, .* left", shown), what
     assert "picture 3 of 3" in shown
     ended = labrig("render", "cornell-box", *SMALL, "--out", "piped")
     assert "tracing" not in ended.err

@@ -18,6 +18,7 @@ from labrig.acquire.roles.door_and_shield import (
     SHIELD,
     SHIELD_COVER,
     SHIELD_UNCOVER,
+    ServoSwing,
     Swing,
     SwingTo,
 )
@@ -151,6 +152,7 @@ __all__ = [
     "ReadSpectrum",
     "Role",
     "SampleChanger",
+    "ServoSwing",
     "Spectrometer",
     "Suggestion",
     "Swing",

@@ -87,6 +87,14 @@ class ServoSwing(BoardDevice):
         travel_s: float = self.settings.travel
         return travel_s
 
+    def ends_at(self) -> tuple[Any, Any]:
+        """Return the positions of the safe end and of the other one, from the rig file."""
+        return self._safe, self._other
+
+    def go(self, position: Any) -> None:
+        """Begin to move to a position, such as a pulse in seconds; used where ends are set up."""
+        self._servo.go(position)
+
     def swing(self, *, safe: bool) -> None:
         """Begin to swing to the safe end or to the other; return when it is acknowledged."""
         self._servo.go(self._safe if safe else self._other)

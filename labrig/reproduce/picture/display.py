@@ -19,7 +19,9 @@ from labrig.optics import (
     XYZ_TO_SRGB,
     CameraResponse,
     band_integrals,
+    from_oklab,
     observer,
+    oklab,
     photopic_efficacy,
     srgb_bytes,
 )
@@ -35,16 +37,6 @@ BRADFORD = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
 
-#: Linear sRGB to cone responses, and these to Oklab (Ottosson 2020, "A perceptual color space for
-#: image processing").
-_TO_CONES = np.array(
-    [[0.4122214708, 0.5363325363, 0.0514459929], [0.2119034982, 0.6806995451, 0.1073969566],
-     [0.0883024619, 0.2817188376, 0.6299787005]]
-)  # fmt: skip
-_TO_OKLAB = np.array(
-    [[0.2104542553, 0.7936177850, -0.0040720468], [1.9779984951, -2.4285922050, 0.4505937099],
-     [0.0259040371, 0.7827717662, -0.8086757660]]
-)  # fmt: skip
 _WHITE_LAB = np.array([1.0, 0.0, 0.0])
 #: How many times brighter than the screen a colour is, less one, where it is half white.
 HALF_WHITE = 8.0
@@ -266,9 +258,9 @@ class Display:
         over = np.maximum(lifted.max(axis=-1, keepdims=True), 1.0)
         fitted = lifted / over
         is_over = over[..., 0] > 1
-        lab = _oklab(fitted[is_over])
+        lab = oklab(fitted[is_over])
         lab += _whitened(over[is_over]) * (_WHITE_LAB - lab)
-        fitted[is_over] = _from_oklab(lab)
+        fitted[is_over] = from_oklab(lab)
         return np.asarray(np.clip(fitted, 0.0, 1.0))
 
     def shown(self, xyz: FloatArray) -> Bytes:
@@ -306,16 +298,6 @@ def _lifted(xyz: FloatArray) -> FloatArray:
 def _whitened(over: FloatArray) -> FloatArray:
     """Return the part of white in a colour so many times brighter than the screen's."""
     return (over - 1) / (over - 1 + HALF_WHITE)
-
-
-def _oklab(linear: FloatArray) -> FloatArray:
-    """Return the coordinates in Oklab of linear sRGB (…, 3)."""
-    return np.asarray(np.cbrt(linear @ _TO_CONES.T) @ _TO_OKLAB.T)
-
-
-def _from_oklab(lab: FloatArray) -> FloatArray:
-    """Return linear sRGB of coordinates in Oklab (…, 3)."""
-    return np.asarray((lab @ np.linalg.inv(_TO_OKLAB).T) ** 3 @ np.linalg.inv(_TO_CONES).T)
 
 
 def _ratio_up_to_one(part: FloatArray, whole: FloatArray) -> FloatArray:
