@@ -135,6 +135,23 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
         typer.echo("\n" + notes.rstrip())
 
 
+@app.command("restore")
+def restore(
+    run: Run,
+    result: Annotated[str, typer.Argument(help="The earlier result, such as 'result-2'.")],
+    runs: Runs = Path("runs"),
+) -> None:
+    """Make an earlier result of a run its result again, as before a 'labrig process'."""
+    from labrig.catalogue import find_run
+    from labrig.process import restore_result
+
+    folder = find_run(run, runs)
+    lines = restore_result(folder, result)
+    typer.echo(f"{folder}: {result} is its result again")
+    for line in lines:
+        typer.echo(f"  {line}")
+
+
 @app.command("compare")
 def compare(
     run: Run,
