@@ -152,6 +152,37 @@ def restore(
         typer.echo(f"  {line}")
 
 
+@app.command("stack")
+def stack(
+    run: Run,
+    runs: Runs = Path("runs"),
+    out: Annotated[
+        Path | None, typer.Option("--out", help="TIFF to write, instead of RUN/result/decay.tif.")
+    ] = None,
+    width: Annotated[
+        int | None,
+        typer.Option("--width", min=1, help="Width to which pictures are averaged, in pixels."),
+    ] = None,
+) -> None:
+    """The frames of a decay as one TIFF of linear values, for ImageJ or napari; times in a CSV."""
+    from labrig.analyse import Overrides, intact_frames
+    from labrig.catalogue import find_run
+    from labrig.export import write_image_stack
+    from labrig.foundation.output_file import write_text
+    from labrig.record import read_run
+
+    folder = find_run(run, runs)
+    frames = intact_frames(read_run(folder), Overrides())
+    path = out or folder / "result" / "decay.tif"
+    ordered = sorted(frames.decay, key=lambda frame: frame.t_s)
+    times, channels, rows, columns = write_image_stack(path, ordered, frames.dark, width)
+    table = path.with_suffix(".csv")
+    lines = [f"{each.path.name},{each.t_s:.6f},{each.exposure_s:.9g}" for each in ordered]
+    write_text(table, "\n".join(["frame,t_s,exposure_s", *lines]) + "\n")
+    typer.echo(f"{path}: {times} times, {channels} channels, {columns} × {rows} pixels, in DN/s")
+    typer.echo(f"{table}: begin after lamp off and exposure time of each")
+
+
 @app.command("compare")
 def compare(
     run: Run,
