@@ -12,7 +12,7 @@ from pathlib import Path
 from labrig.foundation.errors import LabrigError, UsageError
 from labrig.foundation.input_file import read_text
 from labrig.foundation.output_file import make_folder, write_text
-from labrig.foundation.settings_file import settings_file
+from labrig.foundation.user_folder import settings_file
 
 #: Schemes of the addresses that lead to a network; what opens addresses takes no others there.
 NETWORK_SCHEMES = ("ptpip", "socket", "tcp", "http", "https", "rtsp")

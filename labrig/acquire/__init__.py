@@ -13,18 +13,17 @@ from labrig.acquire.channels import (
 )
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.continuation import Continuation
-from labrig.acquire.loading import (
+from labrig.acquire.driver_loading import (
     bank_lights,
-    changes_with_absolute_paths,
     driver_and_settings,
     load_driver,
-    read_protocol,
     require_own_ports,
 )
 from labrig.acquire.plan_clock import Due, PlanClock, step_text
 from labrig.acquire.planner import MAX_STEPS, Plan, Step, plan, planned_rig
 from labrig.acquire.port_trouble import PORT_FAILURES, SERVICES, gone, not_opened
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
+from labrig.acquire.protocol_file import changes_with_absolute_paths, read_protocol
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.rig import Rig, in_safe_order
 from labrig.acquire.rig_file import (

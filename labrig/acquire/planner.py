@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
 from labrig.acquire.continuation import Continuation, Pace
-from labrig.acquire.loading import driver_and_settings, require_own_ports
+from labrig.acquire.driver_loading import driver_and_settings, require_own_ports
 from labrig.acquire.protocol import ProtocolModel, require_inside
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile

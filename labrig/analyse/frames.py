@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from labrig.analyse.frame_times import LATE_S, switched_time, timed, untimed
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile, CameraFile
@@ -258,10 +259,6 @@ def left_out_warnings(t_s: Sequence[float], blank: BlankFile) -> tuple[ResultWar
     )
 
 
-#: Delay in seconds after the planned time from which a warning is given; the measured time counts.
-LATE_S = 0.05
-
-
 def intact_frames(
     run: RunRecord, overrides: Overrides, role: str = FrameRole.DECAY
 ) -> IntactFrames:
@@ -343,33 +340,6 @@ def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[Serie
     ]
 
 
-def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[ResultWarning]:
-    """Return warnings about irregular times in the journal."""
-    warnings: list[ResultWarning] = []
-    if run.torn:
-        warnings.append(
-            Disturbance(
-                "journal-torn",
-                "the journal's last line is torn: labrig was cut off while writing it; what it "
-                "would have said does not count",
-            )
-        )
-    late = [frame for frame in run.frames(role) if frame.late_s > LATE_S]
-    if late:
-        latest = max(late, key=lambda frame: frame.late_s)
-        warnings.append(
-            Disturbance(
-                "frames-late",
-                "{count} frames began late, {latest} by {late_s:.2f} s; their measured times are "
-                "used (leave more time between frames)",
-                count=len(late),
-                latest=latest.path.name,
-                late_s=latest.late_s,
-            )
-        )
-    return warnings
-
-
 def _check_damage(
     run: RunRecord, overrides: Overrides, measured: tuple[str, ...]
 ) -> dict[FrameRecord, str]:
@@ -378,40 +348,6 @@ def _check_damage(
     damaged = damaged_frames(run.folder, shown)
     require(run, {f: damage for f, damage in damaged.items() if f.role in measured}, overrides)
     return damaged
-
-
-def untimed(frame: FrameRecord) -> SeriesFrame:
-    """Return a frame whose time is not used."""
-    return SeriesFrame(
-        frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit,
-        sha256=frame.sha256,
-    )  # fmt: skip
-
-
-def timed(frame: FrameRecord, zero_time: float) -> SeriesFrame:
-    """Return a frame timed from `zero_time`, in seconds since 1970."""
-    return replace(untimed(frame), t_s=frame.start_time - zero_time)
-
-
-def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
-    """Return the time of the lamp's last switch to `on` or `off` before a frame.
-
-    Raises
-    ------
-    DataError
-        The journal has no such switch.
-    """
-    switches = [
-        action.middle_time
-        for action in attempt.actions
-        if action.device == "lamp" and action.action == state
-        if action.start_time <= frame.start_time
-    ]
-    if not switches:
-        raise DataError(
-            f"{frame.path}: the journal does not say when the lamp went {state} before it"
-        )
-    return switches[-1]
 
 
 def _flag_frame(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:

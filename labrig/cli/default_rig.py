@@ -10,7 +10,7 @@ import typer
 from labrig.cli.completion import complete_rig
 from labrig.foundation.errors import LabrigError, UsageError
 from labrig.foundation.input_file import read_text
-from labrig.foundation.settings_file import settings_file
+from labrig.foundation.user_folder import settings_file
 
 #: Environment variable with a rig, which has priority over the one that was chosen.
 VARIABLE = "LABRIG_RIG"

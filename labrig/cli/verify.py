@@ -8,7 +8,7 @@ import typer
 
 from labrig.cli.completion import complete_run
 from labrig.foundation.errors import DataError, UsageError
-from labrig.foundation.settings_file import settings_file
+from labrig.foundation.user_folder import settings_file
 
 if TYPE_CHECKING:
     from labrig.process import Verification

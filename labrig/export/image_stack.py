@@ -109,7 +109,7 @@ def _pictures(
         own = [dark for dark in darks if np.isclose(dark.exposure_s, exposure_s, rtol=1e-3)]
         if own:
             means = (cell_means_dn(read_raw(dark.path)) for dark in own)
-            dark_dn[exposure_s] = sum(means, np.float32(0)) / np.float32(len(own))
+            dark_dn[exposure_s] = np.mean(list(means), axis=0, dtype=np.float32)
     for frame in counted(frames, "reading frames"):
         light = cell_means_dn(read_raw(frame.path))
         light -= dark_dn.get(frame.exposure_s, np.float32(0))

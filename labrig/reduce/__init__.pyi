@@ -2,25 +2,12 @@ from .black_cut_off import (
     BlackCutOff as BlackCutOff,
     find_cut_off as find_cut_off,
 )
-from .channels import (
-    ChannelStats as ChannelStats,
-    FrameMeasurement as FrameMeasurement,
-    PixelMask as PixelMask,
-    measure as measure,
-    measure_regions as measure_regions,
-)
 from .colour_chart import (
     find_colour_chart as find_colour_chart,
 )
 from .dark import (
     DarkModel as DarkModel,
     fit_dark as fit_dark,
-)
-from .frame import (
-    LinearFrame as LinearFrame,
-    RegionSums as RegionSums,
-    cell_means_dn as cell_means_dn,
-    saturated_cells as saturated_cells,
 )
 from .frame_metadata import (
     SensorLayout as SensorLayout,
@@ -52,6 +39,12 @@ from .hot_pixels import (
     hot_pixels as hot_pixels,
     hot_pixels_of as hot_pixels_of,
 )
+from .linear_frame import (
+    LinearFrame as LinearFrame,
+    RegionSums as RegionSums,
+    cell_means_dn as cell_means_dn,
+    saturated_cells as saturated_cells,
+)
 from .measured_frames import (
     SeriesFrame as SeriesFrame,
     measure_region as measure_region,
@@ -78,6 +71,13 @@ from .raw import (
     RawFrame as RawFrame,
     read_exif as read_exif,
     read_raw as read_raw,
+)
+from .region_levels import (
+    ChannelStats as ChannelStats,
+    FrameMeasurement as FrameMeasurement,
+    PixelMask as PixelMask,
+    measure as measure,
+    measure_regions as measure_regions,
 )
 from .rounding import (
     ROUNDING_VARIANCE as ROUNDING_VARIANCE,

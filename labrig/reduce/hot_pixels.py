@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.foundation.errors import DataError
-from labrig.reduce.channels import OUTLIER_SIGMAS, PixelMask
 from labrig.reduce.dark import SAME_EXPOSURE
 from labrig.reduce.frame_reduction import Exposure, reduce_frames
 from labrig.reduce.raw import RawFrame
+from labrig.reduce.region_levels import OUTLIER_SIGMAS, PixelMask
 from labrig.reduce.saturation import histogram
 
 #: Frames in which a hot pixel is bright: a cosmic ray does not hit the same pixel twice.

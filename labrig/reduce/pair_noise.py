@@ -23,11 +23,11 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.foundation.region import Region, region_pixels
-from labrig.reduce.channels import PixelMask
 from labrig.reduce.dark import same_exposure
 from labrig.reduce.photon_transfer import NoiseModel, variance_terms
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
+from labrig.reduce.region_levels import PixelMask
 from labrig.reduce.rounding import ROUNDING_VARIANCE
 
 #: Number of strips of a patch, if it has that many rows of each colour.

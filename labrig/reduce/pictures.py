@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.reduce.frame import LinearFrame, cell_means_dn, saturated_cells
+from labrig.reduce.linear_frame import LinearFrame, cell_means_dn, saturated_cells
 from labrig.reduce.raw import RawFrame
 
 Picture = NDArray[np.float32]

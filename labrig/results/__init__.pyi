@@ -20,7 +20,7 @@ from .decay_patch import (
     NoiseBudget as NoiseBudget,
     ResultWithDecays as ResultWithDecays,
 )
-from .decay_timing import (
+from .decay_reference import (
     DecayReference as DecayReference,
     UnseenFlicker as UnseenFlicker,
     first_row_at as first_row_at,

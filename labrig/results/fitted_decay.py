@@ -14,7 +14,7 @@ from labrig.foundation.errors import DataError, FitError
 from labrig.foundation.number_format import aligned, rounded
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.material import exponential_means_and_slopes
-from labrig.results.decay_timing import DecayReference, UnseenFlicker
+from labrig.results.decay_reference import DecayReference, UnseenFlicker
 from labrig.results.fitted_law import (
     EXPONENTIALS,
     LAW_LABELS,

@@ -12,7 +12,7 @@ import numpy as np
 from labrig.foundation.errors import DataError, LabrigError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
 from labrig.foundation.result_warning import as_warnings
-from labrig.results.decay_timing import DecayReference, UnseenFlicker
+from labrig.results.decay_reference import DecayReference, UnseenFlicker
 from labrig.results.fitted_decay import (
     SCHEMA_VERSION,
     Candidate,

@@ -9,7 +9,7 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import aligned
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.material import exponential_means
-from labrig.results.decay_timing import DecayReference
+from labrig.results.decay_reference import DecayReference
 from labrig.results.fitted_decay import Candidate, DecayState
 from labrig.results.measured import Measured, OneSided, measured_number, with_uncertainty
 from labrig.results.text_files import finite, json_text

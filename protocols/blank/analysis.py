@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from labrig.analyse.frame_times import timing_warnings
 from labrig.analyse.frames import (
     intact_frames,
     part_frames,
     part_region,
     require_calibrated_camera,
-    timing_warnings,
 )
 from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND, BlankFile

@@ -7,11 +7,11 @@ from importlib.metadata import version
 
 import numpy as np
 
+from labrig.analyse.frame_times import timing_warnings
 from labrig.analyse.frames import (
     glare_warning,
     intact_frames,
     require_calibrated_camera,
-    timing_warnings,
     without_stray_light,
 )
 from labrig.analyse.inputs import AnalysisContext

@@ -27,11 +27,11 @@ from labrig.analyse.forward_model import (
     forward_models,
     with_white_reference,
 )
+from labrig.analyse.frame_times import timing_warnings
 from labrig.analyse.frames import (
     intact_frames,
     require_calibrated_camera,
     steady_frames,
-    timing_warnings,
     without_stray_light,
 )
 from labrig.analyse.inputs import AnalysisContext

@@ -4,12 +4,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from labrig.analyse.frames import (
-    intact_frames,
-    require_calibrated_camera,
-    timing_warnings,
-    without_stray_light,
-)
+from labrig.analyse.frame_times import timing_warnings
+from labrig.analyse.frames import intact_frames, require_calibrated_camera, without_stray_light
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.calibration import BLANK_KIND, CAMERA_KIND

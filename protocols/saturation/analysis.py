@@ -21,12 +21,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import fdtrc
 
-from labrig.analyse.frames import (
-    intact_frames,
-    require_calibrated_camera,
-    timing_warnings,
-    without_stray_light,
-)
+from labrig.analyse.frame_times import timing_warnings
+from labrig.analyse.frames import intact_frames, require_calibrated_camera, without_stray_light
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.series_fit import fit_series
 from labrig.calibration import BLANK_KIND, CAMERA_KIND

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from labrig.fit import DecayFit, fit_decay
-from labrig.fit.decay.laws import FASTEST_STEPS, SLOWEST_SPANS
+from labrig.fit.decay.law_fit import FASTEST_STEPS, SLOWEST_SPANS
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
 from labrig.material import DECAY_LAWS

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.analyse.frames import IntactFrames, intact_frames, timing_warnings
+from labrig.analyse.frame_times import timing_warnings
+from labrig.analyse.frames import IntactFrames, intact_frames
 from labrig.analyse.overrides import Overrides
 from labrig.foundation.errors import DataError, LabrigError
 from labrig.record import read_run

@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.optimize import least_squares
 
 from labrig.fit import DecayFit, fit_decay
-from labrig.fit.decay import laws
+from labrig.fit.decay import law_fit
 from labrig.fit.decay.noise_correlation import NoiseLikelihood
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError
@@ -136,14 +136,14 @@ def test_a_law_never_fits_worse_than_one_that_it_contains(
 def test_a_fit_that_does_not_end_at_a_minimum_is_named_and_not_compared(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    own = laws.fit_law
+    own = law_fit.fit_law
 
-    def fit_law(likelihood: NoiseLikelihood, law: DecayLaw, *others: Any) -> laws.LawFit | None:
+    def fit_law(likelihood: NoiseLikelihood, law: DecayLaw, *others: Any) -> law_fit.LawFit | None:
         if law.name == "becquerel":
-            raise laws.UnfinishedFitError("unfinished")
+            raise law_fit.UnfinishedFitError("unfinished")
         return own(likelihood, law, *others)
 
-    monkeypatch.setattr(laws, "fit_law", fit_law)
+    monkeypatch.setattr(law_fit, "fit_law", fit_law)
     fit = fitted("becquerel", 0.4, 3)
     assert "Becquerel" in of_code(fit.warnings, "law-unconverged").values["law"]
     assert {law.name for law in fit.compared_laws}.isdisjoint({"becquerel"})

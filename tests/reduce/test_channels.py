@@ -8,8 +8,8 @@ from hypothesis import given, settings, strategies as st
 
 from labrig.foundation.errors import DataError, FrameError, UsageError
 from labrig.reduce import RawFrame, measure, read_raw
-from labrig.reduce.channels import isolated_outliers
 from labrig.reduce.plane_noise import plane_noise
+from labrig.reduce.region_levels import isolated_outliers
 
 MakeRaw = Callable[..., RawFrame]
 

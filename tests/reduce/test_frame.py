@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 
 from labrig.optics import Flat
 from labrig.reduce import LinearFrame, RawFrame, SensorLayout
-from labrig.reduce.frame import cell_means_dn, saturated_cells
+from labrig.reduce.linear_frame import cell_means_dn, saturated_cells
 from labrig.reduce.photon_transfer import NoiseModel
 
 Floats = npt.NDArray[np.float64]

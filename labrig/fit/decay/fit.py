@@ -22,7 +22,7 @@ from labrig.fit.decay.fit_warnings import (
     refuse_if_rising,
     student_factor,
 )
-from labrig.fit.decay.laws import LawFit, fit_laws, tie_warnings
+from labrig.fit.decay.law_fit import LawFit, fit_laws, tie_warnings
 from labrig.fit.decay.noise_correlation import NoiseLikelihood
 from labrig.fit.decay.rate_spectrum import fit_rate_spectrum
 from labrig.fit.decay.result import DecayFit, assemble

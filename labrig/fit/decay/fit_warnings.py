@@ -24,7 +24,7 @@ from labrig.fit.decay.diagnostics import (
 )
 from labrig.fit.decay.envelope import MIN_NOISE_DOF, Envelope, SigmaScale
 from labrig.fit.decay.further_state import HiddenState
-from labrig.fit.decay.laws import LawFit
+from labrig.fit.decay.law_fit import LawFit
 from labrig.fit.decay.noise_correlation import NoiseCorrelation
 from labrig.fit.decay.series import WhitenedSeries
 from labrig.fit.decay.states import StatesFit

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera, untimed
+from labrig.analyse.frame_times import untimed
+from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CAMERA_KIND
 from labrig.fit.angular import fit_dependence

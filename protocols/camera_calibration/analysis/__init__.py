@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.frames import lens_of, part_frames, part_region, timed, untimed
+from labrig.analyse.frame_times import timed, untimed
+from labrig.analyse.frames import lens_of, part_frames, part_region
 from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CameraFile, Linearity
 from labrig.foundation.arrays import FloatArray

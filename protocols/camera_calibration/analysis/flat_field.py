@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.frames import timed, untimed
+from labrig.analyse.frame_times import timed, untimed
 from labrig.analyse.inputs import AnalysisContext
 from labrig.calibration import CameraFile
 from labrig.foundation.arrays import FloatArray

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.polynomial.legendre import legvander
 from scipy.interpolate import CubicSpline
 
-from labrig.analyse.frames import require_calibrated_camera, timed, untimed
+from labrig.analyse.frame_times import timed, untimed
+from labrig.analyse.frames import require_calibrated_camera
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_regions, tilt_offset
 from labrig.calibration import BLANK_KIND, CAMERA_KIND, FADE_KIND, IrradianceFile, Warming

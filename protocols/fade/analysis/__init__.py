@@ -6,14 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.frames import (
-    part_frames,
-    part_region,
-    require_calibrated_camera,
-    switched_time,
-    timed,
-    untimed,
-)
+from labrig.analyse.frame_times import switched_time, timed, untimed
+from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import CAMERA_KIND, LVF_KIND, CameraFile, Change, FadeFile, Warming

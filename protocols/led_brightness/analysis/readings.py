@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from labrig.analyse.frame_times import untimed
 from labrig.analyse.frames import (
     part_frames,
     part_region,
     require_calibrated_camera,
     require_intact,
-    untimed,
 )
 from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import card_reflectance

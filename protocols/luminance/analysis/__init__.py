@@ -11,14 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from labrig.analyse.frame_times import switched_time, timing_warnings
 from labrig.analyse.frames import (
     IntactFrames,
     glare_warning,
     intact_frames,
     require_calibrated_camera,
     steady_frames,
-    switched_time,
-    timing_warnings,
     without_stray_light,
 )
 from labrig.analyse.inputs import AnalysisContext

@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from labrig.foundation.region import Region, region_pixels
 from labrig.optics import Flat, rho_squared
-from labrig.reduce.channels import PixelMask
 from labrig.reduce.photon_transfer import NoiseModel
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
+from labrig.reduce.region_levels import PixelMask
 from labrig.reduce.rounding import ROUNDING_VARIANCE
 from labrig.reduce.saturation import is_clipped
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.fit_warnings import FitDiagnostics
-from labrig.fit.decay.laws import LawFit
+from labrig.fit.decay.law_fit import LawFit
 from labrig.fit.decay.series import WhitenedSeries
 from labrig.fit.decay.states import StatesFit, exponentials
 from labrig.fit.decay.variable_projection import JointFit, JointProblem, Shape
