@@ -27,7 +27,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "labrig/acquire/running_programs.py",  # of the system: /proc
             "labrig/cli/detachable_stream.py",  # the null device
             "labrig/bench/guard_process.py",  # the null device
-            "labrig/reduce/worker_process.py",  # its own standard output
+            "labrig/reduce/workers/process.py",  # its own standard output
         },
     ),
     "write a file": (
@@ -55,7 +55,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "labrig/bench/device_lock.py",
             "labrig/cli/default_rig.py",
             "labrig/setup/patches_block.py",
-            "labrig/reduce/kept_reductions.py",
+            "labrig/reduce/workers/kept.py",
         },
     ),
     "read or write arrays": (
@@ -94,7 +94,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
         {
             "labrig/foundation/plugins.py",
             "labrig/reproduce/compiled.py",
-            "labrig/reduce/kept_reductions.py",
+            "labrig/reduce/workers/kept.py",
         },
     ),
 }  # fmt: skip
@@ -109,7 +109,7 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
         "labrig/acquire/running_programs.py",  # ps
         "labrig/bench/awake.py",  # systemd-inhibit, caffeinate
         "labrig/bench/guard.py",  # labrig itself
-        "labrig/reduce/frame_workers.py",  # labrig itself
+        "labrig/reduce/workers/pool.py",  # labrig itself
         "labrig/watch/previews.py",  # labrig itself
         "labrig/cli/on_finish.py",  # by consent
         "labrig/reproduce/picture/video.py",  # ffmpeg
@@ -132,7 +132,7 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
         "telnetlib",
     ): set(),
     ("http.server", "socketserver"): {"labrig/local_server.py"},
-    ("pickle",): {"labrig/reduce/frame_workers.py", "labrig/reduce/worker_process.py"},
+    ("pickle",): {"labrig/reduce/workers/pool.py", "labrig/reduce/workers/process.py"},
     ("marshal", "shelve", "dbm", "dill", "joblib", "cloudpickle"): set(),
     ("multiprocessing",): {
         "drivers/gphoto2_camera/process.py",  # a pipe to labrig itself

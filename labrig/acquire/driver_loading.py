@@ -1,4 +1,4 @@
-"""Loading of drivers by the names under which they are registered, and checks of their settings."""
+"""Loading of registered drivers by name, and checks of what their settings claim."""
 
 from collections.abc import Hashable
 from typing import Any

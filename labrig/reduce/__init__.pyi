@@ -14,15 +14,6 @@ from .frame_metadata import (
     frames_exif as frames_exif,
     sensor_layout as sensor_layout,
 )
-from .frame_reduction import (
-    Exposure as Exposure,
-    StoredFrame as StoredFrame,
-    reduce_frames as reduce_frames,
-    reduce_groups as reduce_groups,
-)
-from .frame_workers import (
-    Reduction as Reduction,
-)
 from .glare import (
     FRAME_TILES as FRAME_TILES,
     WHOLE_FRAME as WHOLE_FRAME,
@@ -103,4 +94,13 @@ from .strip import (
     slice_values as slice_values,
     strip_profile as strip_profile,
     strip_profile_in as strip_profile_in,
+)
+from .workers.pool import (
+    Reduction as Reduction,
+)
+from .workers.reduction import (
+    Exposure as Exposure,
+    StoredFrame as StoredFrame,
+    reduce_frames as reduce_frames,
+    reduce_groups as reduce_groups,
 )

@@ -11,10 +11,10 @@ from labrig.foundation.input_file import open_regular
 from labrig.foundation.region import Region, region_pixels
 from labrig.record import FRAMES
 from labrig.reduce.dng import channels_of, side_of
-from labrig.reduce.frame_reduction import StoredFrame, reduce_frames
-from labrig.reduce.kept_reductions import ReductionCache, decoded, encoded
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import Exif, RawFrame, read_exif
+from labrig.reduce.workers.kept import ReductionCache, decoded, encoded
+from labrig.reduce.workers.reduction import StoredFrame, reduce_frames
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
-from labrig.reduce.frame_reduction import Exposure
 from labrig.reduce.linear_frame import LinearFrame
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.reduce.region_levels import PixelMask
+from labrig.reduce.workers.reduction import Exposure
 
 Image = NDArray[np.float32]
 

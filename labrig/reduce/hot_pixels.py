@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from labrig.foundation.errors import DataError
 from labrig.reduce.dark import SAME_EXPOSURE
-from labrig.reduce.frame_reduction import Exposure, reduce_frames
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.region_levels import OUTLIER_SIGMAS, PixelMask
 from labrig.reduce.saturation import histogram
+from labrig.reduce.workers.reduction import Exposure, reduce_frames
 
 #: Frames in which a hot pixel is bright: a cosmic ray does not hit the same pixel twice.
 HOT_FRAMES = 2

@@ -8,12 +8,12 @@ import numpy as np
 
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
-from labrig.reduce.frame_reduction import StoredFrame, reduce_frames
 from labrig.reduce.hot_pixels import HotPixels
 from labrig.reduce.pair_noise import strip_deviations
 from labrig.reduce.plane_noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.region_levels import FrameMeasurement, measure_regions
+from labrig.reduce.workers.reduction import StoredFrame, reduce_frames
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from labrig.foundation.detection import LIT_PIXEL_SIGMA, PRECISE_SIGMA
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
 from labrig.optics import SLICES, CameraModel, Strip
-from labrig.reduce.frame_reduction import Exposure, reduce_groups
 from labrig.reduce.hdr import HdrFrame, Image, hdr_frame
 from labrig.reduce.hot_pixels import HotPixels
 from labrig.reduce.measured_frames import SeriesFrame
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.series import reduce_patches
+from labrig.reduce.workers.reduction import Exposure, reduce_groups
 from labrig.results import Series, SliceValues, StripProfile
 
 #: as a fraction of the brightest light near by,

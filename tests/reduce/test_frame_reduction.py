@@ -18,10 +18,10 @@ from hypothesis.extra.numpy import arrays
 from labrig.foundation.errors import DataError, FrameError, UsageError
 from labrig.record import own_digest
 from labrig.reduce import RawFrame, Reduction, SeriesFrame, reduce_frames, reduce_groups
-from labrig.reduce.frame_workers import reduced_text, texts_from_workers
 from labrig.reduce.hot_pixels import HotPixels
-from labrig.reduce.kept_reductions import decoded, encoded
 from labrig.reduce.measured_frames import MeasureRegions
+from labrig.reduce.workers.kept import decoded, encoded
+from labrig.reduce.workers.pool import reduced_text, texts_from_workers
 from tests.reduce.conftest import WriteDng
 
 HEIGHT, WIDTH = 64, 96

@@ -1,6 +1,6 @@
 """A process that decodes and reduces frames for another one.
 
-    python -P -m labrig.reduce.worker_process
+    python -P -m labrig.reduce.workers.process
 
 It reads from its standard input a reduction and then groups of paths, and answers each on its
 standard output with what is made of the frames, as text, or with an error. The end of its input is
@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 import cv2
 
 from labrig.foundation.errors import LabrigError, memory_shortage
-from labrig.reduce.frame_workers import reduced_text
+from labrig.reduce.workers.pool import reduced_text
 
 _STDOUT, _STDERR = 1, 2
 

@@ -19,8 +19,8 @@ from typing import IO, Any, Protocol, TypeVar
 from labrig.foundation.errors import DataError
 from labrig.foundation.processors import n_processors
 from labrig.foundation.signals import name_of
-from labrig.reduce.kept_reductions import encoded
 from labrig.reduce.raw import RawFrame, read_raw
+from labrig.reduce.workers.kept import encoded
 
 Reduced_co = TypeVar("Reduced_co", covariant=True)
 
@@ -29,7 +29,7 @@ class Reduction(Protocol[Reduced_co]):
     """A reduction of frames: a frozen dataclass that can be imported by its name.
 
     Its fields are all that the outcome depends on besides the frames. They and the outcome, whose
-    type is annotated, are values as `labrig.reduce.kept_reductions` describes them.
+    type is annotated, are values as `labrig.reduce.workers.kept` describes them.
     """
 
     def __call__(self, frames: Iterator[RawFrame], /) -> Reduced_co:
@@ -145,7 +145,7 @@ class _Worker:
 
     def __init__(self, reduction: Reduction[Any]) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "labrig.reduce.worker_process"],
+            [sys.executable, "-P", "-m", "labrig.reduce.workers.process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, "PYTHONPATH": _import_path()},

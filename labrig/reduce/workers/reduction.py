@@ -11,8 +11,8 @@ from typing import Any, Protocol, TypeVar, get_type_hints
 
 from labrig.foundation.activity import counted
 from labrig.record import FRAMES
-from labrig.reduce.frame_workers import Reduction, reduced_text, texts_from_workers, worker_count
-from labrig.reduce.kept_reductions import ReductionCache, decoded
+from labrig.reduce.workers.kept import ReductionCache, decoded
+from labrig.reduce.workers.pool import Reduction, reduced_text, texts_from_workers, worker_count
 
 Reduced = TypeVar("Reduced")
 

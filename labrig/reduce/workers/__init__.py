@@ -1,0 +1,1 @@
+"""Reduction of many frames by processes that keep what they have reduced."""
