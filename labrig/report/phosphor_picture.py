@@ -50,7 +50,7 @@ def draw_phosphor(material: Material, path: Path) -> None:
     panels = [
         (name, label)
         for name, label in (
-            ("k_e_per_s", "excitation rate k_e / s⁻¹"),
+            ("k_e_per_s", "excitation rate kₑ / s⁻¹"),
             ("reradiation", f"re-radiation Λ{UNITS[material.scale][1] or ', relative'}"),
         )
         if any(getattr(state, name) is not None for state in material.states)
@@ -80,7 +80,7 @@ def draw_phosphor(material: Material, path: Path) -> None:
 def _label(state: State) -> str:
     """Return what tells a state from others: its lifetime, or order and τ after its charge."""
     if state.kinetic_order == 1:
-        return f"1/k_r = {rounded(1 / state.k_r_per_s, 3)} s"
+        return f"1/kᵣ = {rounded(1 / state.k_r_per_s, 3)} s"
     order = f"b = {rounded(state.kinetic_order, 3)}"
     time_s = state.decay_time_of_rate_s
     return order if time_s is None else f"{order}, τ = {rounded(time_s, 3)} s"
