@@ -11,7 +11,7 @@ Source: Pololu's Maestro User's Guide, sections 4.e and 5.
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
@@ -110,7 +110,7 @@ class MaestroServo(Servo):
         return quarters(position)
 
     @classmethod
-    def outlet(cls, settings: Settings) -> Hashable:
+    def outlet(cls, settings: Any) -> Hashable:
         """Return the number of the Maestro, and of its channel."""
         return settings.device_number, settings.channel
 

@@ -11,8 +11,6 @@ from labrig.foundation.signals import STOP_SIGNALS, end_at_once
 # The matrices here are small: threads of the linear algebra would only wait for one another, six
 # times as long where another program computes, too. Has to be said before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-#: Exit codes beyond this one are those of signals.
-SIGNALLED = 128
 
 
 def main() -> None:
@@ -23,11 +21,9 @@ def main() -> None:
     from labrig.cli import guarded
 
     code = guarded(sys.argv[1:])
-    if code > SIGNALLED:
-        # Who stopped labrig waits for it: to delete all objects one by one may take a second.
-        atexit._run_exitfuncs()
-        os._exit(code)
-    sys.exit(code)
+    # Somebody waits for it: to delete all objects one by one may take seconds.
+    atexit._run_exitfuncs()
+    os._exit(code)
 
 
 if __name__ == "__main__":

@@ -168,7 +168,7 @@ def warning_texts(roots: Iterable[Path]) -> list[WarningText]:
     kinds = {each.__name__: each.kind for each in ResultWarning.__subclasses__()}
     texts: dict[tuple[str, str], list[str]] = {}
     for path in sorted(path for root in roots for path in root.rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = ast.parse(read_text(path))
         for node in ast.walk(tree):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name)):
                 continue

@@ -25,7 +25,7 @@ DOORS: dict[str, tuple[set[str], set[str]]] = {
             "labrig/foundation/exr_file.py",  # the null device, for what OpenEXR prints
             "labrig/bench/device_lock.py",  # locks of all users, not followed through links
             "labrig/acquire/running_programs.py",  # of the system: /proc
-            "labrig/cli/exit_codes.py",  # the null device
+            "labrig/cli/detachable_stream.py",  # the null device
             "labrig/bench/guard_process.py",  # the null device
             "labrig/reduce/worker_process.py",  # its own standard output
         },

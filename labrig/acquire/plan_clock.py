@@ -51,8 +51,9 @@ class PlanClock:
 
     Attributes
     ----------
-    recorded_frames
-        Number of frames of units that were complete before.
+    frames, most_frames
+        Number of frames so far, those of completed units before the plan included, and the largest
+        number there will be.
 
     Examples
     --------
@@ -76,7 +77,7 @@ class PlanClock:
     def lay_out(self, plan: Plan, recorded_frames: int = 0) -> None:
         """Follow another plan: devices were connected anew, or a completed unit is done again."""
         self.plan = plan
-        self.recorded_frames = recorded_frames
+        self.frames, self.most_frames = recorded_frames, recorded_frames + plan.frames
         self._places: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
         for number, step in enumerate(plan.steps):
             self._places[step.unit, _key(step)].append(number)

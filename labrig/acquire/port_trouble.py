@@ -78,7 +78,10 @@ def not_opened(
         )
     if number in _GONE and (taken := _taken(address, programs)):
         return taken
-    return "check that it is plugged in and that no other program uses it"
+    return (
+        "check that it is plugged in ('labrig rig list' shows the ports) and that no other program "
+        "uses it"
+    )
 
 
 def gone(

@@ -87,7 +87,7 @@ class LuminanceReading(FrozenModel):
         General mismatch index f1′ of the meter, for example `5 %`. Default: not stated.
     """
 
-    value: str
+    value: str = Field(coerce_numbers_to_str=True)
     sigma: Fraction = Field(gt=0, lt=1)
     at: Literal["sample plane", "card"]
     lamp: LampType | None = None

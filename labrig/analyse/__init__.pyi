@@ -3,7 +3,7 @@ from .charge_table import (
     ChargeTableOptions as ChargeTableOptions,
     fit_charge_table as fit_charge_table,
 )
-from .frames import verify_frames as verify_frames
+from .frames import intact_frames as intact_frames, verify_frames as verify_frames
 from .hyperspectral import (
     CubeList as CubeList,
     matrix_from_cubes as matrix_from_cubes,

@@ -276,10 +276,23 @@ def intact_frames(
     role
         Role of the frames of the glow.
 
+    Returns
+    -------
+    IntactFrames
+        Frames of the glow, timed from lamp off, dark frames and daylight frames.
+
     Raises
     ------
     DataError
         No decay is complete, or a frame is missing or was changed and is not excluded.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.analyse import Overrides, intact_frames
+    >>> frames = intact_frames(labrig.read_run("runs/decay"), Overrides())
+    >>> len(frames.decay)
+    18
     """
     damaged = _check_damage(run, overrides, (role, FrameRole.DARK))
     decay = [

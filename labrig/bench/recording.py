@@ -106,7 +106,11 @@ class Recording:
         )
         found = found.without_apertures(requested.apertures())
         protocol = requested.resolved_for(found.rig)
-        require_optics(found.rig)
+        try:
+            require_optics(found.rig)
+        except UsageError as error:
+            error.args = (f"{rig_path}, optics: {error}",)
+            raise
         run_plan = _planned(protocol, protocol_path, found.rig, rig_path)
         _require_free_disk(runs, run_plan.size())
         return cls(protocol, found.rig, rig_path, runs, run_plan, found, tuple(adaptations))

@@ -60,6 +60,7 @@ class ClockedObserver:
 
     def frame(self, record: FrameRecord) -> None:
         """Note that a frame was recorded."""
+        self._plan_clock.frames += 1
         if not self._is_paced:
             self._is_paced = self._has_new_pace = True
         self._observer.frame(record)

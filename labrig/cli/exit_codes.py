@@ -129,6 +129,9 @@ def _wrong_call(error: "TyperException") -> str:
         message = message.replace(problems[0]["msg"], reason)
     context = getattr(error, "ctx", None)
     command = "labrig" if context is None else context.command_path
+    options = () if context is None else [each.opts for each in context.command.params]
+    if "unexpected extra argument" in message and ["--rig"] in options:
+        message += ": a rig is given by --rig"
     return f"{message} (see {command} --help)"
 
 

@@ -206,19 +206,14 @@ class _State:
         self.number = self.total = 0
         self.doing = "connecting"
         self.until_s: float | None = None
-        self._frames = 0
         self._terminal = None if yes else Terminal()
 
     def begin(self, unit: str, number: int, total: int) -> None:
         self.unit, self.number, self.total = unit, number, total
 
-    def count_frame(self) -> None:
-        self._frames += 1
-
     def frames(self) -> str:
         """Return the number of frames and the largest one."""
-        recorded = self.plan_clock.recorded_frames
-        return f"{recorded + self._frames} of {recorded + self.plan_clock.plan.frames}"
+        return f"{self.plan_clock.frames} of {self.plan_clock.most_frames}"
 
     def left_s(self) -> float:
         """Return the planned lab time left in seconds."""
@@ -266,7 +261,6 @@ class PlainProgress:
 
     def frame(self, record: FrameRecord) -> None:
         """Print that a frame was recorded."""
-        self._state.count_frame()
         settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
         self._print(f"frame {self._state.frames()}: {record.role}, {settings}")
 
@@ -316,7 +310,6 @@ class LiveProgress:
 
     def frame(self, record: FrameRecord) -> None:
         """Note that a frame was recorded, and request its preview from another process."""
-        self._state.count_frame()
         if self._previews is None:
             self._run = record.path.parents[1]
             self._previews = Previews(self._run, THUMBNAIL_WIDTH)

@@ -12,6 +12,7 @@ from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.detachable_stream import DetachableStream
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.cli.protocol import protocol_path
+from labrig.foundation.activity import activity
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import UsageError
 
@@ -63,11 +64,12 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
-    from labrig.cli.on_finish import notify_at_end, permitted
-    from labrig.cli.progress import progress
+    with activity("preparing the run"):
+        from labrig.cli.on_finish import notify_at_end, permitted
+        from labrig.cli.progress import progress
 
-    path = rig_path(rig)
-    recording = _prepared(protocol, path, runs)
+        path = rig_path(rig)
+        recording = _prepared(protocol, path, runs)
     at_end = permitted(recording.rig.on_finish, path, is_asked_for=on_finish)
     with notify_at_end(at_end) as ending:
         has_changer = "changer" in recording.rig.devices
@@ -128,14 +130,15 @@ def resume(
 
     If only the result is missing, the run is processed.
     """
-    from labrig.acquire import read_rig_file
-    from labrig.bench import resume_run
-    from labrig.catalogue import find_run, summarise
-    from labrig.cli.on_finish import notify_at_end, permitted
-    from labrig.cli.progress import progress
+    with activity("preparing the run"):
+        from labrig.acquire import read_rig_file
+        from labrig.bench import resume_run
+        from labrig.catalogue import find_run, summarise
+        from labrig.cli.on_finish import notify_at_end, permitted
+        from labrig.cli.progress import progress
 
-    folder = find_run(run, runs)
-    is_processed = summarise(folder).status == "processed"
+        folder = find_run(run, runs)
+        is_processed = summarise(folder).status == "processed"
     path = folder / "rig.yaml"
     rig = read_rig_file(path) if path.is_file() else None
     has_changer = rig is not None and "changer" in rig.devices
@@ -160,10 +163,8 @@ def _confirmed(question: str, *, yes: bool) -> bool:
 
 def _prepared(protocol: str, rig: Path, runs: Path) -> "Recording":
     from labrig.bench import Recording
-    from labrig.foundation.activity import activity
 
-    with activity("laying out the plan"):
-        recording = Recording.prepare(protocol_path(protocol), rig, runs)
+    recording = Recording.prepare(protocol_path(protocol), rig, runs)
     for note in recording.notes():
         # Nobody may read it: the run goes on.
         print(f"note: {note}", file=DetachableStream(sys.stderr))

@@ -135,10 +135,58 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
         typer.echo("\n" + notes.rstrip())
 
 
+@app.command("restore")
+def restore(
+    run: Run,
+    result: Annotated[str, typer.Argument(help="The earlier result, such as 'result-2'.")],
+    runs: Runs = Path("runs"),
+) -> None:
+    """Make an earlier result of a run its result again, as before a 'labrig process'."""
+    from labrig.catalogue import find_run
+    from labrig.process import restore_result
+
+    folder = find_run(run, runs)
+    lines = restore_result(folder, result)
+    typer.echo(f"{folder}: {result} is its result again")
+    for line in lines:
+        typer.echo(f"  {line}")
+
+
+@app.command("stack")
+def stack(
+    run: Run,
+    runs: Runs = Path("runs"),
+    out: Annotated[
+        Path | None, typer.Option("--out", help="TIFF to write, instead of RUN/result/decay.tif.")
+    ] = None,
+    width: Annotated[
+        int | None,
+        typer.Option("--width", min=1, help="Width to which pictures are averaged, in pixels."),
+    ] = None,
+) -> None:
+    """The frames of a decay as one TIFF of linear values, for ImageJ or napari; times in a CSV."""
+    from labrig.analyse import Overrides, intact_frames
+    from labrig.catalogue import find_run
+    from labrig.export import write_image_stack
+    from labrig.foundation.output_file import write_text
+    from labrig.record import read_run
+
+    folder = find_run(run, runs)
+    frames = intact_frames(read_run(folder), Overrides())
+    path = out or folder / "result" / "decay.tif"
+    ordered = sorted(frames.decay, key=lambda frame: frame.t_s)
+    times, channels, rows, columns = write_image_stack(path, ordered, frames.dark, width)
+    table = path.with_suffix(".csv")
+    lines = [f"{each.path.name},{each.t_s:.6f},{each.exposure_s:.9g}" for each in ordered]
+    write_text(table, "\n".join(["frame,t_s,exposure_s", *lines]) + "\n")
+    typer.echo(f"{path}: {times} times, {channels} channels, {columns} × {rows} pixels, in DN/s")
+    typer.echo(f"{table}: begin after lamp off and exposure time of each")
+
+
 @app.command("compare")
 def compare(
-    a: Run,
-    b: Run,
+    run: Run,
+    other: Run,
     runs: Runs = Path("runs"),
     reference: Annotated[
         str | None,
@@ -151,7 +199,7 @@ def compare(
 
     from labrig.catalogue import compare_runs, find_run
 
-    comparison = compare_runs(find_run(a, runs), find_run(b, runs), reference)
+    comparison = compare_runs(find_run(run, runs), find_run(other, runs), reference)
     if json:
         patches = [
             {**asdict(patch), "assessment": patch.assessment} for patch in comparison.patches

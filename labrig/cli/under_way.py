@@ -13,7 +13,7 @@ from labrig.foundation.clock import SystemClock
 from labrig.foundation.quantity import duration_text
 
 #: Time after which work is shown, and the period in which it is shown anew.
-PATIENCE_S, PERIOD_S = 0.8, 0.5
+PATIENCE_S, PERIOD_S = 0.5, 0.4
 #: Least time after which the time left is worth stating.
 FORESEEN_S = 2.0
 #: What takes a terminal back to the begin of an empty line.

@@ -3,7 +3,10 @@
 import errno
 import os
 import stat
+from contextlib import suppress
+from difflib import get_close_matches
 from io import BufferedReader
+from itertools import islice
 from pathlib import Path
 
 from labrig.foundation.errors import DiskError, UsageError
@@ -11,6 +14,8 @@ from labrig.foundation.errors import DiskError, UsageError
 #: Errors of the disk, which no other name and no permission would resolve.
 DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDOUT}
 
+#: Largest number of names in a folder among which a similar one is looked for.
+MAX_LISTED = 1000
 #: Limit that a table of a year's measurements does not reach, but `/dev/zero` does.
 MAX_TEXT_BYTES = 50_000_000
 #: Limit of a JSON text, whose values take up to 25 times its size: of a result of many patches.
@@ -38,7 +43,7 @@ def open_regular(path: Path) -> BufferedReader:
     try:
         descriptor = os.open(path, flags)
     except FileNotFoundError:
-        raise UsageError(f"{path}: no such file") from None
+        raise UsageError(f"{path}: no such file{whereabouts(path)}") from None
     except OSError as error:
         error_class = DiskError if error.errno in DISK_ERRORS else UsageError
         raise error_class(f"{path}: cannot be read ({error.strerror})") from None
@@ -48,6 +53,36 @@ def open_regular(path: Path) -> BufferedReader:
         kind = "a folder" if stat.S_ISDIR(mode) else "a pipe or a device; save it as a file"
         raise UsageError(f"{path}: expected a file, got {kind}")
     return os.fdopen(descriptor, "rb")
+
+
+def whereabouts(path: Path) -> str:
+    """Return a file of a similar name to one that is missing, or that its folder is missing, too.
+
+    Parameters
+    ----------
+    path
+        Path of a file that does not exist.
+
+    Returns
+    -------
+    str
+        End of a message; empty if there is nothing to say.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.foundation.input_file import whereabouts
+    >>> whereabouts(Path("runs/decay/rigg.yaml"))
+    '; did you mean runs/decay/rig.yaml?'
+    """
+    folder = path.parent
+    if not folder.is_dir():
+        return f", and no folder {folder}"
+    with suppress(OSError):
+        names = [each.name for each in islice(folder.iterdir(), MAX_LISTED)]
+        if close := get_close_matches(path.name, names, n=1, cutoff=0.7):
+            return f"; did you mean {path.with_name(close[0])}?"
+    return ""
 
 
 def read_bytes(path: Path, most_bytes: int) -> bytes:

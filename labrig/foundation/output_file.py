@@ -112,9 +112,13 @@ def _draft_of(path: Path, ending: str) -> Iterator[Path]:
         sync_folder(path.parent)
     except OSError as error:
         reason = error.strerror or error
-        raise DiskError(
-            f"{path}: cannot be written ({reason}); see that the disk is there and has room"
-        ) from None
+        folder = path.parent
+        remedy = (
+            "see that the disk is there and has room"
+            if folder.exists()
+            else f"there is no folder {folder}: make it, or write elsewhere"
+        )
+        raise DiskError(f"{path}: cannot be written ({reason}); {remedy}") from None
     finally:
         with suppress(OSError):
             draft.unlink(missing_ok=True)

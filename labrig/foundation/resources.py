@@ -5,6 +5,7 @@ from pathlib import Path
 
 from labrig.foundation.errors import UsageError
 from labrig.foundation.file_kind import CURVES, MATERIAL, PROTOCOL, RIG, SCENE, require_kind
+from labrig.foundation.input_file import whereabouts
 from labrig.foundation.named_files import is_path
 from labrig.foundation.plugins import measurements
 from labrig.foundation.yaml_file import did_you_mean
@@ -55,7 +56,7 @@ def find(place: str, kind: str, name_or_path: str | os.PathLike[str]) -> Path:
         if path.is_dir():
             raise UsageError(f"{path}: expected a {kind} file, got a folder")
         if not path.is_file():
-            raise UsageError(f"{path}: no such {kind} file")
+            raise UsageError(f"{path}: no such {kind} file{whereabouts(path)}")
         return path
     shipped = names(place)
     if str(path) not in shipped:

@@ -242,6 +242,10 @@ def validate(content: Mapping[str, Any], model: type[ModelT], source: str) -> Mo
         return model.model_validate(content)
     except ValidationError as error:
         raise UsageError(f"{source}: {_first_problem(error, model, content)}") from None
+    except UsageError as error:  # of a part that is written as a file of its own
+        if str(error).startswith(source):
+            raise
+        raise UsageError(f"{source}: {error}") from None
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
@@ -262,7 +266,11 @@ def _first_problem(
         keys = list(_sibling_keys(model, problem["loc"]))
         return f"unknown key '{_shortened(key)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
     if problem["type"] == "missing" and not lacks_item(problem):
-        return f"the key '{key}' is missing; it is required"
+        missing = str(problem["loc"][-1])
+        given = [str(each) for each in problem["input"]] if _is_block(problem["input"]) else []
+        misspelt = difflib.get_close_matches(missing, given, n=1, cutoff=0.8)
+        got = f"; did you mean it by '{misspelt[0]}'?" if misspelt else ""
+        return f"the key '{key}' is missing; it is required{got}"
     alike = [each for each in problems if place(each, content) == where]
     shown = _example(model, where)
     message = in_unit_of(shown, refusal(problem, alike, unit_of(shown)), problem["input"])

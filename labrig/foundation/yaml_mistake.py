@@ -84,8 +84,9 @@ def explain(error: MarkedError, text: str) -> YamlMistake:
     if error.problem_mark is None:
         return YamlMistake(None, problem)
     # libyaml counts the end of the text as a line of its own.
-    at = min(error.problem_mark.line, text.count("\n"))
-    begun = None if error.context_mark is None else error.context_mark.line
+    last = len(lines) - 1
+    at = min(error.problem_mark.line, last)
+    begun = None if error.context_mark is None else min(error.context_mark.line, last)
     if _is_indented_by_tab(lines, error.problem_mark.line):
         return _at(at, "expected spaces before the first word, got a tab; YAML indents with spaces")
     if "nesting depth" in problem:

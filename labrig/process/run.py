@@ -17,7 +17,7 @@ from labrig.analyse import (
     temperature_warnings,
 )
 from labrig.bench_optics import camera_curves, with_shipped_camera
-from labrig.calibration import LVF_KIND, LvfFile, keep_calibration
+from labrig.calibration import LVF_KIND, LvfFile, keep_calibration, kept_calibrations
 from labrig.export import write_nexus
 from labrig.foundation.errors import DiskError, FitError, UsageError
 from labrig.foundation.output_file import make_folder_in
@@ -96,6 +96,52 @@ def put_in_place(folder: Path) -> tuple[str, ...]:
     final.rename(earlier)
     folder.rename(final)
     return (f"changed since the result before, which is kept as {earlier.name}:", *lines)
+
+
+def restore_result(run: Path, name: str) -> tuple[str, ...]:
+    """Make an earlier result of a run its result again; the present one is kept as the newest.
+
+    The calibrations that are kept beside a run of a calibration are those of its result again.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+    name
+        Name of the earlier result, such as `result-2`.
+
+    Returns
+    -------
+    tuple of str
+        What that changed, in lines for people.
+
+    Raises
+    ------
+    UsageError
+        The run has no such earlier result, or another process works on it.
+    DataError
+        The run is sealed and was changed since.
+
+    Examples
+    --------
+    >>> from labrig.process import restore_result
+    >>> restore_result("runs/decay", "result-1")
+    Traceback (most recent call last):
+    labrig.foundation.errors.UsageError: runs/decay: expected the name of an earlier result, got
+    'result-1'; the run has none
+    """
+    run = Path(run)
+    names = sorted((path.name for path in _earlier_results(run)), key=lambda each: int(each[7:]))
+    if name not in names:
+        present = f"it has {', '.join(names)}" if names else "the run has none"
+        raise UsageError(f"{run}: expected the name of an earlier result, got '{name}'; {present}")
+    kept = {each.folder.name: each for each in kept_calibrations(run.resolve().parent)}
+    with RunLock(run / LOCK, "restoring a result of this run"):
+        require_as_sealed(run)
+        lines = put_in_place(run / name)
+        if (of_run := kept.get(run.resolve().name)) is not None:
+            keep_calibration(run, of_run.reference)
+    return lines
 
 
 def _earlier_results(run: Path) -> list[Path]:

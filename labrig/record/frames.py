@@ -115,7 +115,24 @@ PC_CLOCK = "clock of the PC"
 
 
 def clock_stepped(change: str) -> Disturbance:
-    """Return the warning of a step of the PC's time of day, such as `set ahead by 1 h`."""
+    """Return the warning of a step of the PC's time of day.
+
+    Parameters
+    ----------
+    change
+        What happened to the clock, such as `set ahead by 1 h`.
+
+    Returns
+    -------
+    Disturbance
+        The warning, which runs and results give alike.
+
+    Examples
+    --------
+    >>> from labrig.record import clock_stepped
+    >>> clock_stepped("set ahead by 1 h").code
+    'pc-clock-stepped'
+    """
     return Disturbance(
         "pc-clock-stepped",
         "the clock of this PC was {change}: times of day in this run go on by the clock as it was "
@@ -141,7 +158,7 @@ def unit_in(part: str, unit: str) -> str:
 
     Examples
     --------
-    from labrig.record import unit_in
+    >>> from labrig.record import unit_in
     >>> unit_in("decay", "decay-1")
     'decay/decay-1'
     """

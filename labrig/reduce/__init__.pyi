@@ -19,6 +19,7 @@ from .dark import (
 from .frame import (
     LinearFrame as LinearFrame,
     RegionSums as RegionSums,
+    cell_means_dn as cell_means_dn,
     saturated_cells as saturated_cells,
 )
 from .frame_metadata import (

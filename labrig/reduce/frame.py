@@ -192,8 +192,25 @@ class _Plane(NamedTuple):
 def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
     """Return the means of each channel in the cells of the colour filter, in DN above black.
 
-    The picture has the shape (rows, columns, C). It is binned and not demosaiced, so that no value
-    is interpolated. Without a colour filter, cells have 2 × 2 pixels.
+    The picture is binned and not demosaiced, so that no value is interpolated. Without a colour
+    filter, cells have 2 × 2 pixels.
+
+    Parameters
+    ----------
+    raw
+        The RAW frame.
+
+    Returns
+    -------
+    ndarray of float32
+        Means in DN, shape (rows, columns, C).
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import cell_means_dn
+    >>> cell_means_dn(labrig.read_raw("frame.dng")).shape
+    (32, 48, 3)
     """
     side = max(raw.cfa_side, 2)
     rows, columns = raw.height // side, raw.width // side

@@ -209,13 +209,11 @@ def write_figures_pdf(path: Path, title: str, sections: Sequence[Section]) -> in
     # Without dates and versions the same figures give the same bytes.
     metadata = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
     content = BytesIO()
-    with figure_style():
-        pdf = PdfPages(content, metadata=metadata)
+    with figure_style(), PdfPages(content, metadata=metadata) as pdf:
         for picture in counted(pictures, "drawing figures"):
             figure = picture.figure()
             figure.patch.set(visible=True, facecolor="white")
             pdf.savefig(figure)
-        pdf.close()  # only a whole one: what an interruption leaves is not finished first
     make_folder(path.parent)
     write_durably(path, content.getvalue())
     return len(pictures)

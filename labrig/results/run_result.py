@@ -79,7 +79,8 @@ class RunResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `result.json`, in which infinity and NaN are texts."""
-        fields = _adapter(type(self)).dump_python(self, mode="json")
+        own_type: Any = type(self)
+        fields = _adapter(own_type).dump_python(self, mode="json")
         content: dict[str, Any] = finite(
             {
                 "kind": self.kind,
@@ -117,12 +118,13 @@ class RunResult:
                 f"a result of '{kind}', version {version}, not of '{cls.kind}', version "
                 f"{cls.schema_version}"
             )
-        read: Self = _adapter(cls).validate_python(fields)
+        own_type: Any = cls
+        read: Self = _adapter(own_type).validate_python(fields)
         return read
 
 
 @cache
-def _adapter(result_type: type[RunResult]) -> TypeAdapter[Any]:
+def _adapter(result_type: Any) -> TypeAdapter[Any]:
     """Return the reader and writer of a type: to build it takes longer than to read a result."""
     return TypeAdapter(result_type)
 

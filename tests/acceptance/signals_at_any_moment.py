@@ -1,4 +1,4 @@
-"""Real processes, stopped by real signals at moments that nobody chose: exit code and one line.
+"""Real processes, stopped by real signals at moments that nobody chose: exit code, line, time.
 
     python -m tests.acceptance.signals_at_any_moment [--trials 50]
 
@@ -19,8 +19,8 @@ SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1]
 AT_ITS_END_S = 0.5
 
 
-def trial(rng: random.Random, runs: str) -> str:
-    """Start a run, stop it; what was wrong, or nothing."""
+def trial(rng: random.Random, runs: str) -> tuple[str, float]:
+    """Start a run, stop it; what was wrong, or nothing, and how long the end took in seconds."""
     process = subprocess.Popen(
         [sys.executable, "-m", "labrig", "run", "decay", "--rig", "sim", "--runs", runs],
         stdout=subprocess.PIPE,
@@ -43,13 +43,15 @@ def trial(rng: random.Random, runs: str) -> str:
         process.send_signal(signum)
         time.sleep(rng.choice([0.0002, 0.002, 0.02]))
     out, rest = process.communicate(timeout=120)
+    took_s = time.monotonic() - began_s
     complaints = [line for line in (said + rest).splitlines() if not line.startswith("[")]
     soon = time.monotonic() - began_s < times * 0.02 + AT_ITS_END_S
     ended_before = process.returncode == 0 and not complaints and soon
     stopped = process.returncode == 128 + signum and len(complaints) == 1
     if ended_before or stopped:
-        return ""
-    return f"{signum.name} x{times}: code {process.returncode}, {complaints}, {out[-200:]!r}"
+        return "", took_s
+    wrong = f"{signum.name} x{times}: code {process.returncode}, {complaints}, {out[-200:]!r}"
+    return wrong, took_s
 
 
 def main() -> None:
@@ -59,8 +61,11 @@ def main() -> None:
     trials = parser.parse_args().trials
     rng = random.Random(1)
     with tempfile.TemporaryDirectory() as runs:
-        wrong = [said for said in (trial(rng, runs) for _ in range(trials)) if said]
-    print(f"{len(wrong)} of {trials} went wrong", *wrong, sep="\n")
+        ends = [trial(rng, runs) for _ in range(trials)]
+    wrong = [said for said, _ in ends if said]
+    longest_s = max(took_s for _, took_s in ends)
+    print(f"{len(wrong)} of {trials} went wrong; the longest end took {longest_s:.1f} s")
+    print(*wrong, sep="\n")
 
 
 if __name__ == "__main__":

@@ -72,4 +72,5 @@ def test_a_step_by_hand_of_a_later_unit_is_announced() -> None:
     clock.begin_step("by hand: close the door", 0.0)
     due = clock.next_by_hand(10.0)
     assert due is not None
-    assert (due.what, due.in_s) == ("take the card away", pytest.approx(790.0))
+    assert due.what == "take the card away"
+    assert due.in_s == pytest.approx(790.0)

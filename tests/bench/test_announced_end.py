@@ -58,3 +58,13 @@ def test_devices_warm_up_again_after_a_resume(
     first_left_s = listeners[0].ends_s[0]
     assert first_left_s > 20 * 60.0, "the warm-up of the camera counts"
     assert abs(listeners[0].late_ends_s(copy)[0]) < LARGEST_S
+
+
+def test_frames_are_counted_over_all_units(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner._Recorder, "decide", as_planned)
+    folder, listener = resumed(run, tmp_path / "run", 2)
+    clock = listener.plan_clock
+    completed = read_run(folder).completed().values()
+    assert clock.frames == clock.most_frames == sum(len(each.frames) for each in completed)

@@ -114,6 +114,9 @@ class NothingRecorded:
     def frames(self, role: str) -> Sequence[FrameRecord]:
         return ()
 
+    def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
+        return ()
+
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         return ()
 

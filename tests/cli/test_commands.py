@@ -496,3 +496,22 @@ def test_a_table_that_leaves_something_open_is_asked_for_an_option(
 ) -> None:
     (tmp_path / "table.csv").write_text(text)
     one_line(labrig("fit", "decay", tmp_path / "table.csv"), code, option)
+
+
+def test_an_earlier_result_is_restored(labrig: Labrig, finished: Path) -> None:
+    before = (finished / "result" / "result.json").read_bytes()
+    assert labrig("process", finished, "--states", "2").code == 0
+    after = (finished / "result" / "result.json").read_bytes()
+    assert after != before
+    (newest,) = sorted(finished.glob("result-*"), key=lambda each: int(each.name[7:]))[-1:]
+    assert (newest / "result.json").read_bytes() == before
+    restored = labrig("runs", "restore", finished, newest.name)
+    assert (restored.code, restored.out.splitlines()[0]) == (
+        0,
+        f"{finished}: {newest.name} is its result again",
+    )
+    assert (finished / "result" / "result.json").read_bytes() == before
+    kept = {each.name: (each / "result.json").read_bytes() for each in finished.glob("result-*")}
+    assert after in kept.values()
+    assert newest.name not in kept
+    one_line(labrig("runs", "restore", finished, "result-77"), 2, "expected the name of an earlier")

@@ -186,7 +186,7 @@ def test_a_run_that_went_on_is_told_from_an_edited_one(labrig: Labrig, finished:
     shutil.rmtree(finished / "result")
     assert labrig("key", "new", LAB).code == 0
     assert labrig("seal", finished).code == 0
-    assert labrig("resume", finished).code == 0
+    assert labrig("resume", finished, "--yes").code == 0
     assert read_run(finished).seal != whole
     ended = labrig("verify", finished)
     assert ended.code == 4

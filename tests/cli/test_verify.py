@@ -66,5 +66,5 @@ def test_a_run_that_goes_on_is_sealed_at_every_line(labrig: Labrig, finished: Pa
     lines = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(b"".join(lines[: len(lines) // 2]))
     shutil.rmtree(finished / "result")
-    assert labrig("resume", finished).code == 0
+    assert labrig("resume", finished, "--yes").code == 0
     assert labrig("verify", finished).code == 0

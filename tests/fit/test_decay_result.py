@@ -77,7 +77,7 @@ def test_table_shows_rates_with_their_sigma() -> None:
 
 def test_table_shows_the_offset_of_each_channel() -> None:
     (line,) = [x for x in str(_seen_fit(offset_sigma=[0.01, 0, 0.01])).splitlines() if "offs" in x]
-    assert re.fullmatch(r"offsets  R -?[\d.]+\(\d+\), G 0, B -?[\d.]+\(\d+\)", line)
+    assert re.fullmatch(r"offsets  R −?[\d.]+\(\d+\), G 0, B −?[\d.]+\(\d+\)", line)
 
 
 def test_prediction_and_residuals_add_up_to_the_values() -> None:

@@ -75,6 +75,15 @@ def test_any_slip_of_the_pen_is_read_or_refused_in_a_line_of_the_text(
         )
 
 
+@given(st.text(alphabet="ab:-{}[],'\"#&*!|>%@\t\n ", max_size=40))
+def test_any_text_is_read_or_refused(text: str) -> None:
+    try:
+        parse_yaml(text, "rig.yaml")
+    except UsageError as error:
+        assert str(error).startswith("rig.yaml")
+        assert "\n" not in str(error)
+
+
 DOOR = "name: x\ndevices:\n  door: {{driver: maestro, address: COM4, channel: 0, {}}}\n"
 #: Keys of a door, and what is said of them.
 UNITS = [

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -89,7 +90,8 @@ def test_apertures_of_a_shipped_calibration_are_those_of_the_lens(
     tmp_path: Path, rig_file: Callable[..., Path]
 ) -> None:
     recording = prepared(tmp_path, rig_file(("[2.8, 4, 5.6, 8]", "[3.5, 5, 9]")), "calibration")
-    camera, *_ = recording.protocol.parts
+    protocol: Any = recording.protocol
+    camera, *_ = protocol.parts
     assert camera["f_numbers"] == [3.5, 5.0, 9.0]
     assert camera["camera"]["f_number"] == 3.5
     assert [each.key for each in recording.adaptations][:2] == [
@@ -142,7 +144,8 @@ def test_a_file_of_ones_own_is_adapted_where_it_leaves_a_key_out(
     own = tmp_path / "own.yaml"
     own.write_text("protocol: camera_calibration\n", "utf-8")
     recording = prepared(tmp_path, rig_file(), own)
-    assert recording.protocol.f_numbers == (2.8, 4.0, 5.6, 8.0)
+    protocol: Any = recording.protocol
+    assert protocol.f_numbers == (2.8, 4.0, 5.6, 8.0)
 
 
 def test_a_refusal_of_a_shipped_chain_says_how_to_get_a_file_to_change(

@@ -34,7 +34,7 @@ def test_everything_said() -> None:
         ("{body: nikon}", "'eos' or 'standard'"),
         ("{exposure_mode: N}", "'P', 'Tv', 'Av', 'M' or 'B'"),
         ("{iso: 123}", "thirds of a stop"),
-        ("{auto_power_off: 60}", "'60 s'"),
+        ("{auto_power_off: 60}", "'60 min'"),
         ("{body: standard, mirror_lock_up: true}", "'body: eos' with mirror_lock_up"),
     ],
 )
