@@ -291,7 +291,12 @@ def write_report(path: Path, report: Report) -> None:
     True
     """
     figure_files = FigureFiles()
-    rendered = draw((*report.sections, *report.methods), figure_files)
+    # The list of contents leads to every section.
+    sections = [
+        replace(section, anchor=section.anchor or f"section-{number}")
+        for number, section in enumerate((*report.sections, *report.methods), 1)
+    ]
+    rendered = draw(sections, figure_files)
     text = (
         environment()
         .get_template(TEMPLATE)
