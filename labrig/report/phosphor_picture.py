@@ -9,7 +9,7 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.number_format import rounded
 from labrig.material import Material, State
 from labrig.report.figure_files import require_picture, save_picture
-from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
+from labrig.report.figure_style import INK, LEFT_PT, OTHER_CHANNELS, figure_style, new_figure, place
 from labrig.report.material_tables import UNITS
 
 #: Name of the panel of the albedo among those of the states' quantities.
@@ -18,6 +18,12 @@ ALBEDO = "albedo"
 # matplotlib is slow to load.
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+#: Height of a panel of the figure of bands in points, with the distance to the next.
+PANEL_PT = 130.0
+_BANDS_PANELS = (("k_e_per_s", "kₑ / s⁻¹"), ("reradiation", "Λ"))
 
 
 def draw_phosphor(material: Material, path: Path) -> None:
@@ -75,6 +81,36 @@ def draw_phosphor(material: Material, path: Path) -> None:
             axes.set(xlabel="wavelength / nm")
             axes.set_title(label, fontsize="medium", color=INK)
         save_picture(figure, path)
+
+
+def bands_figure(material: Material) -> "Figure":
+    """Return the figure of excitation rates and re-radiation of every state over the wavelength."""
+    panels = [
+        (name, label)
+        for name, label in _BANDS_PANELS
+        if any(getattr(state, name) is not None for state in material.states)
+    ]
+    height_pt = 52 + PANEL_PT * len(panels)
+    figure = new_figure(height_pt)
+    for number, (name, label) in enumerate(panels):
+        top = 8 + PANEL_PT * number
+        bottom = height_pt - top - PANEL_PT + 10
+        axes = place(figure, left=LEFT_PT, bottom=bottom, right=12, top=top)
+        _draw_bands(axes, material, name)
+        for text in axes.get_legend().get_texts():
+            text.set_color(INK)
+        unit = UNITS[material.scale][1] or ", relative"
+        axes.set_ylabel(label + (unit if name == "reradiation" else ""))
+        axes.tick_params(labelbottom=number == len(panels) - 1)
+    axes.set_xlabel("Wavelength / nm")
+    return figure
+
+
+def has_bands(material: Material) -> bool:
+    """Return whether there is anything that `bands_figure` draws."""
+    return any(
+        getattr(state, name) is not None for state in material.states for name, _ in _BANDS_PANELS
+    )
 
 
 def _label(state: State) -> str:
