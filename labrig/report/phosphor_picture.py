@@ -97,8 +97,6 @@ def bands_figure(material: Material) -> "Figure":
         bottom = height_pt - top - PANEL_PT + 10
         axes = place(figure, left=LEFT_PT, bottom=bottom, right=12, top=top)
         _draw_bands(axes, material, name)
-        for text in axes.get_legend().get_texts():
-            text.set_color(INK)
         unit = UNITS[material.scale][1] or ", relative"
         axes.set_ylabel(label + (unit if name == "reradiation" else ""))
         axes.tick_params(labelbottom=number == len(panels) - 1)
@@ -135,7 +133,7 @@ def _draw_albedo(axes: "Axes", material: Material) -> None:
                 capsize=2, label=label,
             )  # fmt: skip
     axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize="small")
+    axes.legend(frameon=False, fontsize="small", labelcolor=INK)
 
 
 def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
@@ -161,4 +159,4 @@ def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
             linestyle="--", label="spectrum, scaled",
         )  # fmt: skip
     axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize="small")
+    axes.legend(frameon=False, fontsize="small", labelcolor=INK)
