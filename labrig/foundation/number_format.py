@@ -1,9 +1,13 @@
 """Formatting of numbers in reports, rounded according to their uncertainty."""
 
 import math
+import re
 from collections.abc import Sequence
 
+_SUBSCRIPT = str.maketrans("aehijklmnoprstuvx0123456789", "ₐₑₕᵢⱼₖₗₘₙₒₚᵣₛₜᵤᵥₓ₀₁₂₃₄₅₆₇₈₉")
+_SYMBOL = re.compile(r"\b([A-Za-zΑ-Ωα-ω])_([aehijklmnoprstuvx0-9])\b")
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_NUMBER_OF_A_PROGRAM = re.compile(r"(?<![\w.])(-?)(\d+(?:\.\d+)?)(e[+-]?\d+)?(%?)(?![\w])")
 #: Smallest value written without a power of ten.
 MIN_PLAIN = 1e-3
 #: Values from here on are written with a power of ten.
@@ -73,6 +77,19 @@ def exposure_text(exposure_s: float) -> str:
 def power_of_ten(exponent: int) -> str:
     """Format a power of ten, such as `10⁻³`."""
     return "10" + str(exponent).translate(_SUPERSCRIPT)
+
+
+def subscripted(text: str) -> str:
+    """Return text with symbols such as `k_r` set with a subscript, `kᵣ`, where no markup is."""
+    return _SYMBOL.sub(lambda found: found[1] + found[2].translate(_SUBSCRIPT), text)
+
+
+def typeset(text: str) -> str:
+    """Return a text whose numbers are as people write them: `−1.2`, `12 %`, `3 × 10⁻⁷`.
+
+    Numbers that are parts of words, file names and dates stay as they are.
+    """
+    return _NUMBER_OF_A_PROGRAM.sub(lambda found: as_written(found[0]), text)
 
 
 def as_written(number: str) -> str:

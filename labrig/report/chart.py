@@ -4,6 +4,7 @@ A page of many patches has hundreds of figures. matplotlib takes about a tenth o
 and half a second to load; the SVG of a chart takes a hundredth of that.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeAlias
@@ -11,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
-from labrig.foundation.number_format import rounded
+from labrig.foundation.number_format import power_of_ten, rounded
 from labrig.report.figure_style import (
     BAND_OPACITY,
     LEFT_PT,
@@ -156,8 +157,18 @@ class Axis:
 def linear_axis(
     label: str, low: float, high: float, most: int = 8, text: Callable[[float], str] = rounded
 ) -> Axis:
-    """Return an axis with at most `most + 1` evenly spaced ticks that `text` writes."""
-    return Axis(label, low, high, linear_ticks(low, high, most, text))
+    """Return an axis with at most `most + 1` evenly spaced ticks that `text` writes.
+
+    A power of ten of its values stands once, in the label.
+    """
+    ticks = linear_ticks(low, high, most, text)
+    if text is rounded and any("×" in written for _, written in ticks):
+        exponent = math.floor(math.log10(max(abs(value) for value, _ in ticks)))
+        ticks = tuple((value, text(value / 10.0**exponent)) for value, _ in ticks)
+        quantity, _, unit = label.partition(" / ")
+        power = power_of_ten(exponent)
+        label = f"{quantity} / " + (f"({power} {unit.strip('()')})" if unit else power)
+    return Axis(label, low, high, ticks)
 
 
 def logarithmic_axis(label: str, low: float, high: float, most: int = 8) -> Axis:

@@ -239,15 +239,15 @@ def _legend(chart: Chart) -> Iterator[str]:
         max(text_width(label) for label, _ in chart.legend[column::columns])
         for column in range(columns)
     ]
-    yield f'<g style="fill:{INK};font-size:{SMALL_PT:g}px">'
+    yield f'<g class="legend" style="fill:{INK};font-size:{SMALL_PT:g}px">'
     for number, (label, mark) in enumerate(chart.legend):
         row, column = divmod(number, columns)
         before = sum(widths[:column]) + column * (HANDLE + HANDLE_GAP + COLUMN_GAP)
         x = LEFT_PT - 4 + SMALL_PT * before
         middle = SMALL_PT * (1.05 + ROW * row)
-        yield _handle(mark, x, middle)
+        yield f"<g>{_handle(mark, x, middle)}"
         text_x, base = x + SMALL_PT * (HANDLE + HANDLE_GAP), middle + CAPITAL / 2 * SMALL_PT
-        yield f'<text x="{text_x:.5g}" y="{base:.4g}">{html.escape(label)}</text>'
+        yield f'<text x="{text_x:.5g}" y="{base:.4g}">{html.escape(label)}</text></g>'
     yield "</g>"
 
 

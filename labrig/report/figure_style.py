@@ -71,8 +71,8 @@ def decade_text(value: float) -> str:
     exponent = math.floor(math.log10(value) + 1e-9)
     if -3 <= exponent <= 4:
         return f"{value:g}"
-    digit = round(value / 10.0**exponent)
-    return power_of_ten(exponent) if digit == 1 else f"{digit} × {power_of_ten(exponent)}"
+    digits = rounded(value / 10.0**exponent, 3)
+    return power_of_ten(exponent) if digits == "1" else f"{digits} × {power_of_ten(exponent)}"
 
 
 #: Width of figures in points, so that 10 pt is legible at half a desktop's or a phone's width.

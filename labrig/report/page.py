@@ -19,7 +19,7 @@ from markupsafe import Markup, escape
 
 from labrig.foundation.errors import DiskError
 from labrig.foundation.input_file import read_text
-from labrig.foundation.number_format import plus_minus, rounded
+from labrig.foundation.number_format import plus_minus, rounded, subscripted, typeset
 from labrig.foundation.output_file import write_text
 from labrig.foundation.quantity import duration_text
 from labrig.foundation.result_warning import ResultWarning
@@ -32,6 +32,8 @@ from labrig.results import interval_rows
 
 _FOLDER = Path(__file__).parent
 _SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
+#: A power: an exponent without blanks, or in parentheses.
+_POWER = re.compile(r"\^(?:\(([^()]*)\)|([−\w.]*\w))")
 
 
 def _by_path(name: str) -> str | None:
@@ -64,6 +66,7 @@ def environment() -> Environment:
     )
     templates.filters["quoted"] = shlex.quote
     templates.filters["indexed"] = _indexed
+    templates.filters["subscripted"] = subscripted
     templates.filters["titled"] = _titled
     return templates
 
@@ -86,8 +89,9 @@ def dated_notes(text: str) -> list[tuple[str, str]]:
 
 
 def _indexed(text: str) -> Markup:
-    """Return text with symbols such as `k_i` set with a subscript."""
-    return Markup(_SYMBOL.sub(r"<i>\1</i><sub><i>\2</i></sub>", str(escape(text))))
+    """Return text with indices as in `k_i` and powers as in `t^2` set as such, numbers too."""
+    written = _SYMBOL.sub(r"<i>\1</i><sub><i>\2</i></sub>", str(escape(typeset(text))))
+    return Markup(_POWER.sub(r"<sup>\1\2</sup>", written))
 
 
 def _utc(frame: FrameRecord) -> str:
@@ -287,7 +291,12 @@ def write_report(path: Path, report: Report) -> None:
     True
     """
     figure_files = FigureFiles()
-    rendered = draw((*report.sections, *report.methods), figure_files)
+    # The list of contents leads to every section.
+    sections = [
+        replace(section, anchor=section.anchor or f"section-{number}")
+        for number, section in enumerate((*report.sections, *report.methods), 1)
+    ]
+    rendered = draw(sections, figure_files)
     text = (
         environment()
         .get_template(TEMPLATE)

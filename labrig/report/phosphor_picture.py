@@ -9,7 +9,7 @@ from labrig.foundation.errors import UsageError
 from labrig.foundation.number_format import rounded
 from labrig.material import Material, State
 from labrig.report.figure_files import require_picture, save_picture
-from labrig.report.figure_style import INK, OTHER_CHANNELS, figure_style
+from labrig.report.figure_style import INK, LEFT_PT, OTHER_CHANNELS, figure_style, new_figure, place
 from labrig.report.material_tables import UNITS
 
 #: Name of the panel of the albedo among those of the states' quantities.
@@ -18,6 +18,12 @@ ALBEDO = "albedo"
 # matplotlib is slow to load.
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+#: Height of a panel of the figure of bands in points, with the distance to the next.
+PANEL_PT = 130.0
+_BANDS_PANELS = (("k_e_per_s", "kₑ / s⁻¹"), ("reradiation", "Λ"))
 
 
 def draw_phosphor(material: Material, path: Path) -> None:
@@ -50,7 +56,7 @@ def draw_phosphor(material: Material, path: Path) -> None:
     panels = [
         (name, label)
         for name, label in (
-            ("k_e_per_s", "excitation rate k_e / s⁻¹"),
+            ("k_e_per_s", "excitation rate kₑ / s⁻¹"),
             ("reradiation", f"re-radiation Λ{UNITS[material.scale][1] or ', relative'}"),
         )
         if any(getattr(state, name) is not None for state in material.states)
@@ -77,10 +83,38 @@ def draw_phosphor(material: Material, path: Path) -> None:
         save_picture(figure, path)
 
 
+def bands_figure(material: Material) -> "Figure":
+    """Return the figure of excitation rates and re-radiation of every state over the wavelength."""
+    panels = [
+        (name, label)
+        for name, label in _BANDS_PANELS
+        if any(getattr(state, name) is not None for state in material.states)
+    ]
+    height_pt = 52 + PANEL_PT * len(panels)
+    figure = new_figure(height_pt)
+    for number, (name, label) in enumerate(panels):
+        top = 8 + PANEL_PT * number
+        bottom = height_pt - top - PANEL_PT + 10
+        axes = place(figure, left=LEFT_PT, bottom=bottom, right=12, top=top)
+        _draw_bands(axes, material, name)
+        unit = UNITS[material.scale][1] or ", relative"
+        axes.set_ylabel(label + (unit if name == "reradiation" else ""))
+        axes.tick_params(labelbottom=number == len(panels) - 1)
+    axes.set_xlabel("Wavelength / nm")
+    return figure
+
+
+def has_bands(material: Material) -> bool:
+    """Return whether there is anything that `bands_figure` draws."""
+    return any(
+        getattr(state, name) is not None for state in material.states for name, _ in _BANDS_PANELS
+    )
+
+
 def _label(state: State) -> str:
     """Return what tells a state from others: its lifetime, or order and τ after its charge."""
     if state.kinetic_order == 1:
-        return f"1/k_r = {rounded(1 / state.k_r_per_s, 3)} s"
+        return f"1/kᵣ = {rounded(1 / state.k_r_per_s, 3)} s"
     order = f"b = {rounded(state.kinetic_order, 3)}"
     time_s = state.decay_time_of_rate_s
     return order if time_s is None else f"{order}, τ = {rounded(time_s, 3)} s"
@@ -99,7 +133,7 @@ def _draw_albedo(axes: "Axes", material: Material) -> None:
                 capsize=2, label=label,
             )  # fmt: skip
     axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize="small")
+    axes.legend(frameon=False, fontsize="small", labelcolor=INK)
 
 
 def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
@@ -125,4 +159,4 @@ def _draw_bands(axes: "Axes", material: Material, name: str) -> None:
             linestyle="--", label="spectrum, scaled",
         )  # fmt: skip
     axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize="small")
+    axes.legend(frameon=False, fontsize="small", labelcolor=INK)

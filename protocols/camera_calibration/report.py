@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
@@ -17,6 +18,8 @@ from labrig.protocols.camera_calibration.result import (
     PhotonTransfer,
 )
 from labrig.report.figure_style import (
+    BAND_OPACITY,
+    DASHED,
     INK,
     LEFT_PT,
     MARKERS,
@@ -26,6 +29,7 @@ from labrig.report.figure_style import (
     channel_colour,
     error_bars,
     legend_above,
+    line_entry,
     marker_entry,
     new_figure,
     place,
@@ -44,7 +48,7 @@ def render(result: CameraCalibrationResult, source: Source) -> Rendered:
     if file.linearity is not None:
         sections.append(_linearity(file.linearity))
     sections += [_settings(file, result.repeat_flicker), _flat_field(file, result.flats)]
-    return Rendered(tuple(sections), tuple(_lines(file)))
+    return Rendered(tuple(sections), tuple(_lines(file, result.flats)))
 
 
 def _noise(transfers: Sequence[PhotonTransfer]) -> Section:
@@ -216,11 +220,16 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
     first = flats[0]
     rows = tuple(
         (
-            "–" if flat.f_number is None else f"f/{flat.f_number:g}",
-            *(f"{100 * illumination:.1f}" for illumination in flat.at(1.0)),
-            f"{100 * max(abs(g) for row in flat.gradient for g in row):.1f}",
+            "–" if fitted.flat.f_number is None else f"f/{fitted.flat.f_number:g}",
+            *(
+                plus_minus(100 * light, 100 * sigma)
+                for light, sigma in zip(
+                    fitted.flat.at(1.0), fitted.sigma_at(np.ones(1))[0], strict=True
+                )
+            ),
+            f"{100 * max(abs(g) for row in fitted.flat.gradient for g in row):.1f}",
         )
-        for flat in (fitted.flat for fitted in flats)
+        for fitted in flats
     )
     head = ("Aperture", *(f"{name} in the corners / %" for name in file.channels), "Gradient / %")
     stop = first.flat.f_number
@@ -236,32 +245,57 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
                 partial(_flat_figure, first, file.channels),
                 "Blocks of the card"
                 + ("" if stop is None else f" at f/{stop:g}")
-                + ", the gradient divided out, and the fitted vignetting.",
+                + ", the gradient divided out, and the fitted vignetting; dashed: extrapolated "
+                "beyond the card, band: ± 1 σ.",
             ),
         ),
-        (Table(head, rows, "Relative illumination of the corners, and the lamp's gradient."),),
+        (
+            Table(
+                head,
+                rows,
+                "Relative illumination of the corners, and the lamp's gradient. The card "
+                f"reaches to {rounded(first.measured_to, 2)} of half the diagonal: the corners are "
+                "extrapolated, ± 1 σ by the scatter of the blocks with one more power of the "
+                "distance left free than the curve has.",
+            ),
+        ),
     )
+
+
+def _corner(fitted: FittedFlat) -> str:
+    """Return the relative illumination of the corners in the darkest channel, with ± 1 σ."""
+    corners, stop = fitted.flat.at(1.0), fitted.flat.f_number
+    darkest = int(np.argmin(corners))
+    sigma = float(fitted.sigma_at(np.ones(1))[0, darkest])
+    at = "" if stop is None else f" at f/{stop:g}"
+    return f"{plus_minus(100 * float(corners[darkest]), 100 * sigma)} %{at}"
 
 
 def _flat_figure(fitted: FittedFlat, channels: Sequence[str]) -> Figure:
     """Draw the relative illumination over the distance from the middle of the frame."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
-    rho = np.linspace(0, 1, 101)
-    entries = []
+    rho, end = np.linspace(0, 1, 101), fitted.measured_to
+    sigma = fitted.sigma_at(rho**2)
+    entries: list[Artist] = []
     for number, name in enumerate(channels):
         colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
         distance = np.sqrt(fitted.rho2[number])
         points(axes, distance, fitted.light[number], marker, colour, PAPER, size=2.6)
-        axes.plot(rho, fitted.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
+        curve = fitted.flat.at(rho**2)[:, number]
+        band = curve - sigma[:, number], curve + sigma[:, number]
+        axes.fill_between(rho, *band, color=colour, alpha=BAND_OPACITY, linewidth=0)
+        axes.plot(rho[rho <= end], curve[rho <= end], color=colour, linewidth=1.2)
+        axes.plot(rho[rho >= end], curve[rho >= end], color=colour, linewidth=1.2, linestyle=DASHED)
         entries.append(marker_entry(name, marker, colour, PAPER))
+    entries.append(line_entry("beyond the card", MUTED, DASHED))
     axes.set_xlabel("Distance from the middle / half the diagonal")
     axes.set_ylabel("Relative illumination")
     legend_above(figure, entries, columns=4)
     return figure
 
 
-def _lines(file: CameraFile) -> Iterator[str]:
+def _lines(file: CameraFile, flats: Sequence[FittedFlat]) -> Iterator[str]:
     """Yield the lines for the terminal."""
     for noise in file.noise:
         yield (
@@ -277,12 +311,7 @@ def _lines(file: CameraFile) -> Iterator[str]:
             )
             factor = plus_minus(largest.factor, largest.sigma)
             yield f"{name}: largest deviation from nominal at {setting}, × {factor}"
-    corners = [float(np.min(flat.at(1.0))) for flat in file.flats]
-    stops = ["" if flat.f_number is None else f" at f/{flat.f_number:g}" for flat in file.flats]
-    corner_texts = (
-        f"{100 * corner:.1f} %{stop}" for corner, stop in zip(corners, stops, strict=True)
-    )
-    yield f"vignetting: corners at {', '.join(corner_texts)}"
+    yield f"vignetting: corners, beyond the card, at {', '.join(map(_corner, flats))}"
     if glare := file.glare:
         text = plus_minus(100 * glare.fraction, 100 * glare.sigma)
         yield f"veiling glare: {text} % of the frame's mean light"

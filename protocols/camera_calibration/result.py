@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from labrig.calibration import CAMERA_KIND, CameraFile, Noise
 from labrig.foundation.arrays import FloatArray
 from labrig.optics import Flat
@@ -116,6 +118,40 @@ class FittedFlat:
     flat: Flat
     rho2: FloatArray
     light: FloatArray
+
+    @property
+    def measured_to(self) -> float:
+        """Distance of the outermost block from the centre, relative to half the diagonal."""
+        return float(np.sqrt(self.rho2.max()))
+
+    def sigma_at(self, rho2: FloatArray) -> FloatArray:
+        """Return σ of the relative illumination by the scatter of the blocks about the fit.
+
+        One more power of the distance than the curve has is left free, since beyond the card its
+        form is not known.
+
+        Parameters
+        ----------
+        rho2
+            Squared distances from the centre in units of half the diagonal, shape (n,).
+
+        Returns
+        -------
+        FloatArray
+            Standard uncertainties, shape (n, channels).
+        """
+        powers = np.arange(len(self.flat.falloff[0]) + 2)
+        sigmas = []
+        for channel, (block_rho2, light) in enumerate(zip(self.rho2, self.light, strict=True)):
+            design = block_rho2[:, np.newaxis] ** powers
+            residual = light - self.flat.at(block_rho2)[:, channel]
+            variance = residual @ residual / max(len(light) - len(powers) - 2, 1)
+            covariance = variance * np.linalg.inv(design.T @ design)
+            # Relative to the centre, whose own value is fitted too.
+            relative = np.atleast_1d(rho2)[:, np.newaxis] ** powers
+            relative[:, 0] = 1 - self.flat.at(np.atleast_1d(rho2))[:, channel]
+            sigmas.append(np.sqrt(np.einsum("ni,ij,nj->n", relative, covariance, relative)))
+        return np.stack(sigmas, axis=1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -445,7 +445,7 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
         )
     axes.set_ylim(0, None)
     axes.set_xlabel("Excitation wavelength / nm")
-    axes.set_ylabel("k_e / 10⁻³ s⁻¹")
+    axes.set_ylabel("kₑ / 10⁻³ s⁻¹")
     legend_above(figure, entries, columns=3)
     return figure
 
@@ -454,9 +454,9 @@ def _state_label(fit: FittedExcitation, number: int) -> str:
     """Return k_r of a state; where that is not known, order and τ after the brightest charge."""
     state = fit.states[number]
     if state.is_apart:
-        return f"k_r {state.k_r_per_s:.3g} s⁻¹"
+        return f"kᵣ {rounded(state.k_r_per_s, 3)} s⁻¹"
     time_s = float(fit.at_off[-1].decay_time_s[number])
-    return f"b {state.kinetic_order:.3g}, τ {time_s:.3g} s; scale not known"
+    return f"b {rounded(state.kinetic_order, 3)}, τ {rounded(time_s, 3)} s; scale not known"
 
 
 def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: FloatArray) -> Figure:

@@ -14,6 +14,7 @@ from labrig.record import FrameRecord, FrameRole
 from labrig.report.colours import Screen, screen_for, spectrum_colour
 from labrig.report.decay_figures import logarithmic_decay
 from labrig.report.material_tables import comparison_table, measured_table
+from labrig.report.phosphor_picture import bands_figure, has_bands
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.renderers import render_chain
 from labrig.report.report_model import GlowPhotograph
@@ -62,7 +63,16 @@ def render(result: PhosphorResult, source: Source) -> Rendered:
 
 def _summary(result: PhosphorResult, source: Source) -> Section:
     """Return the section with the material as measured, its photographs, and the list of parts."""
-    figures, colours = [], {}
+    colours = {}
+    figures = [
+        Picture(
+            f"bands-{name}",
+            partial(bands_figure, material),
+            f"Excitation rates and re-radiation{_patch_suffix(name, result)} in bands, with ± 1 σ.",
+        )
+        for name, material in result.materials.items()
+        if has_bands(material)
+    ]
     for name, patch in _decays(result).items():
         figures.append(
             Picture(

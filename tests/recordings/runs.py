@@ -153,3 +153,6 @@ RUNS = (
     ),
     *(Recorded(name, record) for name, record in RECORD.items()),
 )
+
+#: Their numbers take several seconds each, and are compared by `python -m tests.recordings`.
+SLOW = {"led_fluorescence", "calibration", "calibration_check", "reflectance"}

@@ -6,10 +6,7 @@ from pathlib import Path
 import pytest
 
 from .numbers import differences
-from .runs import RUNS, Recorded
-
-#: Their numbers take several seconds each, and are compared by `python -m tests.recordings`.
-SLOW = {"led_fluorescence", "calibration", "calibration_check", "reflectance"}
+from .runs import RUNS, SLOW, Recorded
 
 
 @pytest.mark.parametrize(
