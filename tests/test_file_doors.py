@@ -148,7 +148,7 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
     ("OpenEXR",): {"labrig/foundation/exr_file.py"},
     ("PIL",): {"labrig/foundation/picture_file.py"},
     ("rawpy",): {"labrig/reduce/raw.py", "labrig/process/provenance.py"},  # there its version
-    ("tifffile",): {"labrig/reduce/dng.py"},
+    ("tifffile",): {"labrig/reduce/dng.py", "labrig/export/image_stack.py"},
     ("exifread",): {"labrig/reduce/raw.py", "labrig/setup/check.py"},  # there of the own camera
     ("h5py",): {"labrig/export/nexus.py"},
     ("yaml",): {

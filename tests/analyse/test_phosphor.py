@@ -86,7 +86,7 @@ def test_a_chain_that_was_killed_and_resumed_ends_in_one_material(
     assert fit["states"][0]["k_r_per_s"] == pytest.approx(0.032, rel=0.02)
     page = (run / "result" / "report.html").read_text()
     # As measured on top, rescaled to the paper in a section of its own.
-    before, _, after = page.partition("Compared with a reference")
+    before, _, after = page.rpartition("Compared with a reference")
     k_e, k_e_sigma = state.k_e_per_s[1], state.k_e_per_s_sigma[1]
     assert plus_minus(k_e, k_e_sigma) in before
     assert "beside blue-paint of Nalbach" in after.replace("Beside", "beside")

@@ -69,7 +69,7 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     assert "rates are the same after all 6 charges" in rates
     assert "no sign of a kinetic order above 1" in order
     assert "order-sample" in done.report.read_text()
-    assert "The weaker light was 50% of the full one (σ 2% of that)" in done.report.read_text()
+    assert "The weaker light was 50 % of the full one (σ 2 % of that)" in done.report.read_text()
 
 
 @pytest.mark.campaign

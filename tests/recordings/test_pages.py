@@ -12,6 +12,10 @@ pytestmark = pytest.mark.drawn
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
+#: Runs whose figures take seconds to draw; those of the others show the same kinds of content.
+DRAWN_SLOWLY = {
+    "camera_curves", "colour_check", "fade", "irradiance", "led_brightness", "lvf_calibration",
+}  # fmt: skip
 PHONE = {"width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": True}
 #: Script that lists what a reader cannot read, and what nobody should have to.
 UNREADABLE = (Path(__file__).parent / "unreadable.js").read_text(encoding="utf-8")
@@ -28,7 +32,11 @@ def unreadable(chromium: "Chrome", page: Path) -> list[str]:
 @pytest.mark.parametrize(
     "run",
     [
-        pytest.param(run, id=run.name, marks=[pytest.mark.campaign] * (run.name in SLOW))
+        pytest.param(
+            run,
+            id=run.name,
+            marks=[pytest.mark.campaign] * (run.name in {*SLOW, *DRAWN_SLOWLY}),
+        )
         for run in RUNS
     ],
 )
