@@ -45,8 +45,8 @@ def check(fit: dict[str, Any], name: str) -> None:
     true = sorted((state.k_r_per_s for state in read_material(name).states), reverse=True)
     assert fit["n_states"] == len(true), name
     for state, k_r_per_s in zip(fit["states"], true, strict=True):
-        assert abs(state["k_r_per_s"] - k_r_per_s) < MAX_SIGMAS * state["k_r_sigma_per_s"], name
-        assert state["k_r_sigma_per_s"] < 0.1 * k_r_per_s, "a σ of nothing proves nothing"
+        assert abs(state["k_r_per_s"] - k_r_per_s) < MAX_SIGMAS * state["k_r_per_s_sigma"], name
+        assert state["k_r_per_s_sigma"] < 0.1 * k_r_per_s, "a σ of nothing proves nothing"
 
 
 @pytest.mark.campaign
@@ -87,5 +87,5 @@ def test_eleven_patches_in_one_charge_give_the_rates_of_one_by_one(
     alone = measured(labrig, tmp_path, make_rig(sample=name, sensor=SENSOR), "decay")
     check(fit_of(alone), name)
     (one,), (other,) = fit_of(alone)["states"], fit_of(together, name)["states"]
-    sigma = (one["k_r_sigma_per_s"] ** 2 + other["k_r_sigma_per_s"] ** 2) ** 0.5
+    sigma = (one["k_r_per_s_sigma"] ** 2 + other["k_r_per_s_sigma"] ** 2) ** 0.5
     assert abs(one["k_r_per_s"] - other["k_r_per_s"]) < MAX_SIGMAS * sigma

@@ -120,4 +120,4 @@ def test_a_table_in_the_shape_of_a_real_phosphors_has_its_rates(
     fit = json.loads(ended.out)
     assert fit["sigma_factor"] == pytest.approx(1.448**0.5, rel=0.02)
     for state, k_r_per_s in zip(fit["states"], (0.01046, 0.00205), strict=True):
-        assert abs(state["k_r_per_s"] - k_r_per_s) < 3 * state["k_r_sigma_per_s"]
+        assert abs(state["k_r_per_s"] - k_r_per_s) < 3 * state["k_r_per_s_sigma"]

@@ -50,7 +50,7 @@ class CombinedFrame:
 
 def combined(frames: FilterFrames) -> CombinedFrame:
     """Combine frames of different brightness."""
-    weight = np.nan_to_num(1 / (frames.sigma_dn_per_s**2 + frames.dark_sigma_dn_per_s**2))
+    weight = np.nan_to_num(1 / (frames.sigma_dn_per_s**2 + frames.dark_dn_per_s_sigma**2))
     value = np.nan_to_num(frames.value_dn_per_s)
     brightness = np.ones(len(frames))
     for _ in range(COMBINING_ROUNDS):

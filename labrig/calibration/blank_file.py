@@ -33,9 +33,9 @@ class BlankFile(FrozenModel):
     rate_dn_per_s, sigma_dn_per_s
         Signal without the constant level and its σ in DN/s, a row for each of `t_s`, a number for
         each channel.
-    constant_dn_per_s, constant_sigma_dn_per_s
+    constant_dn_per_s, constant_dn_per_s_sigma
         Constant level after lamp off that the dark frames lack, in DN/s, and its σ.
-    ambient_dn_per_s, ambient_sigma_dn_per_s
+    ambient_dn_per_s, ambient_dn_per_s_sigma
         Stray light in frames and dark frames alike, beyond dark current, in DN/s, and its σ. It is
         a lower bound: the channel with the least signal is taken for dark.
     first_clean_s
@@ -58,9 +58,9 @@ class BlankFile(FrozenModel):
     rate_dn_per_s: tuple[Row, ...]
     sigma_dn_per_s: tuple[tuple[NotNegative, ...], ...]
     constant_dn_per_s: Row
-    constant_sigma_dn_per_s: tuple[NotNegative, ...]
+    constant_dn_per_s_sigma: tuple[NotNegative, ...]
     ambient_dn_per_s: Row
-    ambient_sigma_dn_per_s: tuple[NotNegative, ...]
+    ambient_dn_per_s_sigma: tuple[NotNegative, ...]
     first_clean_s: NotNegative | None
     source: str = ""
     run: str | None = None
@@ -72,9 +72,9 @@ class BlankFile(FrozenModel):
         rows = (*self.rate_dn_per_s, *self.sigma_dn_per_s)
         levels = (
             self.constant_dn_per_s,
-            self.constant_sigma_dn_per_s,
+            self.constant_dn_per_s_sigma,
             self.ambient_dn_per_s,
-            self.ambient_sigma_dn_per_s,
+            self.ambient_dn_per_s_sigma,
         )
         if len(self.rate_dn_per_s) != len(self.t_s) or len(self.sigma_dn_per_s) != len(self.t_s):
             raise ValueError("expected a row of rates and of σ for every time in 't_s'")
@@ -103,8 +103,8 @@ class BlankFile(FrozenModel):
         warnings = []
         for occasion, level, sigma in (
             ("after lamp off, but not in dark frames", self.constant_dn_per_s,
-             self.constant_sigma_dn_per_s),
-            ("all the time", self.ambient_dn_per_s, self.ambient_sigma_dn_per_s),
+             self.constant_dn_per_s_sigma),
+            ("all the time", self.ambient_dn_per_s, self.ambient_dn_per_s_sigma),
         ):  # fmt: skip
             brightest = int(np.argmax(level))
             if level[brightest] > SIGNIFICANT * sigma[brightest]:

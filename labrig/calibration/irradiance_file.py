@@ -79,7 +79,7 @@ class IrradianceFile(FrozenModel):
         Position of the LVF on the sample, as the camera sees the sample; null of selected lights.
     card
         Signal of the grey card under the lamp itself; null if it was not kept.
-    illuminance_lux, illuminance_sigma_lux
+    illuminance_lux, illuminance_lux_sigma
         Illuminance by the lamp itself at the sample in lux, read from a meter, and σ; null if it
         was not read.
     source, run
@@ -119,7 +119,7 @@ class IrradianceFile(FrozenModel):
     strip: Strip | None = None
     card: CardLight | None = None
     illuminance_lux: Positive | None = None
-    illuminance_sigma_lux: NotNegative | None = None
+    illuminance_lux_sigma: NotNegative | None = None
     source: str = ""
     run: str | None = None
 

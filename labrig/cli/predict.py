@@ -107,10 +107,10 @@ def _states(prediction: "Prediction", patch: str) -> "Table":
     for i, rate in enumerate(predicted.rate_per_s):
         table.add_row(
             str(i + 1),
-            with_uncertainty(rate, predicted.rate_sigma_per_s[i]),
-            _percent(predicted.rate_sigma_per_s[i] / rate),
+            with_uncertainty(rate, predicted.rate_per_s_sigma[i]),
+            _percent(predicted.rate_per_s_sigma[i] / rate),
             *([with_uncertainty(*orders[i])] if has_order else []),
-            _percent(predicted.amplitude_sigma_dn_per_s[i] / predicted.amplitude_dn_per_s[i]),
+            _percent(predicted.amplitude_dn_per_s_sigma[i] / predicted.amplitude_dn_per_s[i]),
             _noise(predicted, i),
         )
     return table
@@ -159,8 +159,8 @@ def _warnings(prediction: "Prediction", patch: str) -> list[ResultWarning]:
             )
         )
     for i, rate in enumerate(predicted.rate_per_s):
-        rate_sigma = predicted.rate_sigma_per_s[i] / rate
-        amplitude_sigma = predicted.amplitude_sigma_dn_per_s[i] / predicted.amplitude_dn_per_s[i]
+        rate_sigma = predicted.rate_per_s_sigma[i] / rate
+        amplitude_sigma = predicted.amplitude_dn_per_s_sigma[i] / predicted.amplitude_dn_per_s[i]
         if max(rate_sigma, amplitude_sigma) > HARDLY_KNOWN:
             warnings.append(
                 Undetermined(
@@ -196,7 +196,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
             remedy.change.description,
             *(
                 _percent(sigma / rate)
-                for sigma, rate in zip(after.rate_sigma_per_s, after.rate_per_s, strict=True)
+                for sigma, rate in zip(after.rate_per_s_sigma, after.rate_per_s, strict=True)
             ),
             f"{remedy.gain:.2f}",
             *(

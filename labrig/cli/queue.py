@@ -160,7 +160,7 @@ def _content(entry: "QueueEntry") -> dict[str, object]:
                 "patch": state.patch,
                 "state": state.number,
                 "k_r_per_s": state.k_r_per_s.value,
-                "k_r_sigma_per_s": state.k_r_per_s.sigma,
+                "k_r_per_s_sigma": state.k_r_per_s.sigma,
                 "amplitude": state.amplitude.value,
                 "amplitude_sigma": state.amplitude.sigma,
             }

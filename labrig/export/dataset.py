@@ -225,7 +225,7 @@ def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict
     states, weights = ("patch", "state"), ("patch", "channel")
     return {
         "k_r_per_s": (states, state_rows("k_r_per_s"), PER_S),
-        "k_r_sigma_per_s": (states, state_rows("k_r_sigma_per_s"), PER_S),
+        "k_r_per_s_sigma": (states, state_rows("k_r_per_s_sigma"), PER_S),
         "amplitude": (states, state_rows("amplitude"), DN_PER_S),
         "amplitude_sigma": (states, state_rows("amplitude_sigma"), DN_PER_S),
         "channel_weight": (weights, channel_rows("channel_weights")),

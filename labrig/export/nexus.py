@@ -270,7 +270,7 @@ def _add_parameters(process: h5py.Group, fit: FittedDecay) -> None:
         add_number(parameters, f"{name}_errors", errors, units)
 
     states = fit.states
-    add("rate", [s.k_r_per_s for s in states], [s.k_r_sigma_per_s for s in states], "1/s")
+    add("rate", [s.k_r_per_s for s in states], [s.k_r_per_s_sigma for s in states], "1/s")
     unit = fit.value_unit or DN_PER_S
     add("amplitude", [s.amplitude for s in states], [s.amplitude_sigma for s in states], unit)
     add_text(parameters, "channel", fit.channels)

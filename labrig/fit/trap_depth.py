@@ -24,7 +24,7 @@ ALTERNATIONS = 6
 def fit_trap_depth(
     temperature_c: ArrayLike,
     rate_per_s: ArrayLike,
-    rate_sigma_per_s: ArrayLike,
+    rate_per_s_sigma: ArrayLike,
     *,
     temperature_sigma_k: float = 0.3,
 ) -> TrapDepth:
@@ -37,7 +37,7 @@ def fit_trap_depth(
     ----------
     temperature_c
         Temperatures of the sample in °C, shape (n,), n ≥ 2, in any order.
-    rate_per_s, rate_sigma_per_s
+    rate_per_s, rate_per_s_sigma
         Rates and their σ in 1/s, > 0, shape (n,).
     temperature_sigma_k
         Standard uncertainty of each temperature in K, independent of the others, ≥ 0.
@@ -62,7 +62,7 @@ def fit_trap_depth(
     0.558(11) eV
     """
     celsius, rate, sigma = (
-        np.asarray(each, dtype=np.float64) for each in (temperature_c, rate_per_s, rate_sigma_per_s)
+        np.asarray(each, dtype=np.float64) for each in (temperature_c, rate_per_s, rate_per_s_sigma)
     )
     if not celsius.shape == rate.shape == sigma.shape or celsius.ndim != 1 or celsius.size < 2:
         raise FitError(
@@ -109,7 +109,7 @@ def fit_trap_depth(
     return TrapDepth(
         temperature_c=celsius,
         rate_per_s=rate,
-        rate_sigma_per_s=sigma,
+        rate_per_s_sigma=sigma,
         temperature_sigma_k=temperature_sigma_k,
         depth_ev=Measured(depth, depth_sigma, "eV"),
         log10_frequency=log10_frequency,

@@ -64,7 +64,7 @@ class PatchPrediction:
     ----------
     rate_per_s
         Rates assumed at lamp off in 1/s, shape (m,): k_r, or b k_r r(0)^(b − 1) of a kinetic order.
-    rate_sigma_per_s
+    rate_per_s_sigma
         Standard uncertainties of the rates in 1/s, shape (m,); infinite if undetermined.
     kinetic_order
         Kinetic orders b assumed, shape (m,).
@@ -73,7 +73,7 @@ class PatchPrediction:
         infinite if undetermined.
     amplitude_dn_per_s
         Amplitudes assumed in DN/s, shape (m,).
-    amplitude_sigma_dn_per_s
+    amplitude_dn_per_s_sigma
         Standard uncertainties of the amplitudes in DN/s, shape (m,); infinite if undetermined.
     budget
         Fraction of each rate's variance by source of noise, shape (m,).
@@ -87,11 +87,11 @@ class PatchPrediction:
     """
 
     rate_per_s: tuple[float, ...]
-    rate_sigma_per_s: tuple[float, ...]
+    rate_per_s_sigma: tuple[float, ...]
     kinetic_order: tuple[float, ...]
     kinetic_order_sigma: tuple[float, ...]
     amplitude_dn_per_s: tuple[float, ...]
-    amplitude_sigma_dn_per_s: tuple[float, ...]
+    amplitude_dn_per_s_sigma: tuple[float, ...]
     budget: Mapping[str, tuple[float, ...]]
     chance_of_all_states: float
     least_apart: float
@@ -108,11 +108,11 @@ class PatchPrediction:
             "states": [
                 {
                     "rate_per_s": self.rate_per_s[i],
-                    "rate_sigma_per_s": _finite(self.rate_sigma_per_s[i]),
+                    "rate_per_s_sigma": _finite(self.rate_per_s_sigma[i]),
                     "kinetic_order": self.kinetic_order[i],
                     "kinetic_order_sigma": _finite(self.kinetic_order_sigma[i]),
                     "amplitude_dn_per_s": self.amplitude_dn_per_s[i],
-                    "amplitude_sigma_dn_per_s": _finite(self.amplitude_sigma_dn_per_s[i]),
+                    "amplitude_dn_per_s_sigma": _finite(self.amplitude_dn_per_s_sigma[i]),
                     "noise": {source: part[i] for source, part in self.budget.items()},
                 }
                 for i in range(len(self.rate_per_s))
@@ -155,11 +155,11 @@ def predicted_patches(expectation: Expectation) -> dict[str, PatchPrediction]:
         shape_sigma[series.shape > 0] = fit_information.sigma[2 * len(order) :]
         patches[patch] = PatchPrediction(
             rate_per_s=tuple(series.rate_per_s.tolist()),
-            rate_sigma_per_s=tuple(fit_information.sigma[rates].tolist()),
+            rate_per_s_sigma=tuple(fit_information.sigma[rates].tolist()),
             kinetic_order=tuple(order.tolist()),
             kinetic_order_sigma=tuple((order**2 * shape_sigma).tolist()),
             amplitude_dn_per_s=tuple(series.amplitude.tolist()),
-            amplitude_sigma_dn_per_s=tuple(fit_information.sigma[amplitudes].tolist()),
+            amplitude_dn_per_s_sigma=tuple(fit_information.sigma[amplitudes].tolist()),
             budget={
                 source: tuple(part[rates].tolist())
                 for source, part in fit_information.budget.items()

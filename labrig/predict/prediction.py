@@ -116,7 +116,7 @@ class Trials:
 
 
 def _rate_sigmas(patches: Mapping[str, PatchPrediction]) -> list[float]:
-    return [sigma for patch in patches.values() for sigma in patch.rate_sigma_per_s]
+    return [sigma for patch in patches.values() for sigma in patch.rate_per_s_sigma]
 
 
 def _geometric_mean_ratio(after: Sequence[float], before: Sequence[float]) -> float:
@@ -235,7 +235,7 @@ def predict(
     >>> plan = labrig.plan(protocol, rig, "rig.yaml")
     >>> prediction = predict(protocol, plan, rig, "rig.yaml", Sources({"": "blue-paint"}))
     >>> patch = prediction.patches["sample"]
-    >>> f"k_r = {patch.rate_per_s[0]} ± {patch.rate_sigma_per_s[0]:.0e} 1/s"
+    >>> f"k_r = {patch.rate_per_s[0]} ± {patch.rate_per_s_sigma[0]:.0e} 1/s"
     'k_r = 0.032 ± 6e-05 1/s'
     >>> prediction.remedies[0].change.description
     'for: 3 min'

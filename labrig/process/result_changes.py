@@ -217,7 +217,7 @@ def _parameters(fit: FittedDecay) -> Parameters:
     """Return value and σ of every parameter of a fit by name."""
     parameters: dict[str, tuple[float, float]] = {}
     for number, state in enumerate(fit.states, start=1):
-        parameters[f"k_r {number}"] = state.k_r_per_s, state.k_r_sigma_per_s
+        parameters[f"k_r {number}"] = state.k_r_per_s, state.k_r_per_s_sigma
         parameters[f"a {number}"] = state.amplitude, state.amplitude_sigma
     for name, values, sigmas in (
         ("weight", fit.channel_weights, fit.channel_weights_sigma),

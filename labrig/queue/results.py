@@ -134,7 +134,7 @@ class QueueEntry:
                 yield FoundState(
                     patch,
                     number,
-                    Measured(state.k_r_per_s, state.k_r_sigma_per_s),
+                    Measured(state.k_r_per_s, state.k_r_per_s_sigma),
                     Measured(state.amplitude, state.amplitude_sigma),
                 )
 
@@ -243,9 +243,9 @@ def write_results(folder: Path, name: str, listed: Sequence[QueueEntry]) -> Path
 def _csv(listed: Sequence[QueueEntry]) -> str:
     """Return a line for each rate and luminance of each run, and one of a run that found none."""
     keys = _keys(listed)
-    found = ["k_r_per_s", "k_r_sigma_per_s", "amplitude", "amplitude_sigma"]
+    found = ["k_r_per_s", "k_r_per_s_sigma", "amplitude", "amplitude_sigma"]
     luminous = any(entry.luminances for entry in listed)
-    light = ["t_s", "luminance_mcd_per_m2", "luminance_sigma_mcd_per_m2"] if luminous else []
+    light = ["t_s", "luminance_mcd_per_m2", "luminance_mcd_per_m2_sigma"] if luminous else []
     head = ["number", "protocol", *keys, "status", "run", "patch", "state", *found, *light]
     table: list[list[object]] = []
     for entry in listed:

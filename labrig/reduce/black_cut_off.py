@@ -188,7 +188,7 @@ class BlackCutOff:
             np.interp(mean_dn, mean, np.gradient(level) / np.gradient(mean + 1e-9 * level))
         )
 
-    def level_sigma_dn(self, mean_dn: float) -> float:
+    def level_dn_sigma(self, mean_dn: float) -> float:
         """Return σ of `level_dn` in DN by the uncertainty of the noise."""
         _, mean, sigma, _ = self._means
         if mean_dn >= mean[-1]:

@@ -318,7 +318,7 @@ def _uncut(plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: flo
         plane,
         value=plane.value + (level - mean),
         cut_off=int(lowest),
-        cut_off_sigma=cut_off.level_sigma_dn(mean),
+        cut_off_sigma=cut_off.level_dn_sigma(mean),
         noise=replace(plane.noise, mean_variance=variance),
     )
 

@@ -60,7 +60,7 @@ class CandidateRow:
 
 def state_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
     """Return rows of rates, lifetimes, half-lives and amplitudes in `unit`, one column a state."""
-    rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in fit.states]
+    rates = [(state.k_r_per_s, state.k_r_per_s_sigma) for state in fit.states]
     lifetimes = [_lifetime(rate, sigma) for rate, sigma in rates]
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
     amplitudes = [(state.amplitude, state.amplitude_sigma) for state in fit.states]
@@ -114,7 +114,7 @@ def reradiance_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
                 2 * float(fit.covariance[2 * number, 2 * number + 1]) / (rate * amplitude)
             )
             relative2 = (
-                (state.k_r_sigma_per_s / rate) ** 2
+                (state.k_r_per_s_sigma / rate) ** 2
                 + (state.amplitude_sigma / amplitude) ** 2
                 - (relative_covariance if math.isfinite(relative_covariance) else 0.0)
                 + ((weight_sigma / weight) ** 2 if weight > 0 else 0.0)

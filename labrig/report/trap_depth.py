@@ -74,7 +74,7 @@ def trap_depth_chart(depths: Sequence[StateDepth]) -> Chart:
         line = np.array([depth.rate_at(float(t_c)).value for t_c in line_c])
         marks += [
             Line(colour, _inverse(line_c), line),
-            ErrorBars(colour, at, depth.rate_per_s, depth.rate_sigma_per_s),
+            ErrorBars(colour, at, depth.rate_per_s, depth.rate_per_s_sigma),
             dots,
         ]
         legend.append((f"{each.name}, E = {depth.depth_ev}", dots))

@@ -104,7 +104,7 @@ class DecayPatch:
         unseen = fit.unseen_state
         for number, state in enumerate(fit.states):
             quantities = (
-                ("k_r", Measured(state.k_r_per_s, state.k_r_sigma_per_s, "1/s"), "rate_changes"),
+                ("k_r", Measured(state.k_r_per_s, state.k_r_per_s_sigma, "1/s"), "rate_changes"),
                 (
                     "amplitude",
                     Measured(state.amplitude, state.amplitude_sigma, unit),

@@ -36,7 +36,7 @@ class FilterFrames:
         Signal of every position and channel in DN/s, shape (f, m); NaN where it clips.
     sigma_dn_per_s
         Independent standard uncertainty of the signal in DN/s, shape (f, m).
-    dark_sigma_dn_per_s
+    dark_dn_per_s_sigma
         Common-mode standard uncertainty of a frame's values by the dark level in DN/s, shape (f,
         m).
     """
@@ -44,7 +44,7 @@ class FilterFrames:
     t_s: FloatArray
     value_dn_per_s: FloatArray
     sigma_dn_per_s: FloatArray
-    dark_sigma_dn_per_s: FloatArray
+    dark_dn_per_s_sigma: FloatArray
 
     def __len__(self) -> int:
         return len(self.t_s)
@@ -56,7 +56,7 @@ class FilterFrames:
             self.t_s[indices],
             self.value_dn_per_s[indices],
             self.sigma_dn_per_s[indices],
-            self.dark_sigma_dn_per_s[indices],
+            self.dark_dn_per_s_sigma[indices],
         )
 
 
@@ -78,7 +78,7 @@ class SpectralComparison:
     beyond_noise
         Relative root mean square difference in excess of noise, weighted towards bright places; 0
         if noise explains all.
-    shift_nm, shift_sigma_nm
+    shift_nm, shift_nm_sigma
         Shift of the centroid of light along the filter and its standard uncertainty in nm.
     """
 
@@ -89,7 +89,7 @@ class SpectralComparison:
     p_value: float
     beyond_noise: float
     shift_nm: float
-    shift_sigma_nm: float
+    shift_nm_sigma: float
 
 
 class EmissionSpectrum(FrozenModel):

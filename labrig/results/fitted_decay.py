@@ -48,7 +48,7 @@ class DecayState:
 
     Attributes
     ----------
-    k_r_per_s, k_r_sigma_per_s
+    k_r_per_s, k_r_per_s_sigma
         Rate k in 1/s; σ is 0 if it was held.
     amplitude, amplitude_sigma
         Amplitude a at lamp off, or another `reference`, in the brightest channel, in the unit of
@@ -56,7 +56,7 @@ class DecayState:
     """
 
     k_r_per_s: float
-    k_r_sigma_per_s: float
+    k_r_per_s_sigma: float
     amplitude: float
     amplitude_sigma: float
 
@@ -310,7 +310,7 @@ class FittedDecay:
     @property
     def rates(self) -> tuple[Measured, ...]:
         """Decay rate of every state in 1/s, falling."""
-        return tuple(Measured(s.k_r_per_s, s.k_r_sigma_per_s, "1/s") for s in self.states)
+        return tuple(Measured(s.k_r_per_s, s.k_r_per_s_sigma, "1/s") for s in self.states)
 
     @property
     def chosen_law(self) -> FittedLaw | None:
@@ -581,7 +581,7 @@ class FittedDecay:
         str
             The ones that are the largest in σ; empty if none of them is worth a word.
         """
-        rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in self.states]
+        rates = [(state.k_r_per_s, state.k_r_per_s_sigma) for state in self.states]
         amplitudes = [(state.amplitude, state.amplitude_sigma) for state in self.states]
         largest = [
             _largest_in_sigma(rate_changes, rates),
@@ -648,8 +648,8 @@ class FittedDecay:
         rows = [
             [
                 str(number),
-                with_uncertainty(state.k_r_per_s, state.k_r_sigma_per_s),
-                with_uncertainty(1 / state.k_r_per_s, state.k_r_sigma_per_s / state.k_r_per_s**2),
+                with_uncertainty(state.k_r_per_s, state.k_r_per_s_sigma),
+                with_uncertainty(1 / state.k_r_per_s, state.k_r_per_s_sigma / state.k_r_per_s**2),
                 with_uncertainty(state.amplitude, state.amplitude_sigma),
             ]
             for number, state in enumerate(self.states, start=1)

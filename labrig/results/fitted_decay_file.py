@@ -188,7 +188,7 @@ def _from_dict(content: Any) -> FittedDecay:
         states=tuple(
             DecayState(
                 k_r_per_s=float(state["k_r_per_s"]),
-                k_r_sigma_per_s=_number_or(state["k_r_sigma_per_s"]),
+                k_r_per_s_sigma=_number_or(state["k_r_per_s_sigma"]),
                 amplitude=float(state["amplitude"]),
                 amplitude_sigma=_number_or(state["amplitude_sigma"]),
             )

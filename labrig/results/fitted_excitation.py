@@ -84,11 +84,11 @@ class ExcitedState:
 
     Attributes
     ----------
-    k_r_per_s, k_r_sigma_per_s
+    k_r_per_s, k_r_per_s_sigma
         Re-radiation rate in 1/s, that of a full state.
     amplitude, amplitude_sigma
         Glow Λ* k_r of a fully charged sample in the brightest channel, in the unit of the values.
-    k_e_per_s, k_e_sigma_per_s
+    k_e_per_s, k_e_per_s_sigma
         Excitation rates in 1/s per unit of the irradiance E, of the series that defines it, shape
         (B,).
     kinetic_order, kinetic_order_sigma
@@ -99,11 +99,11 @@ class ExcitedState:
     """
 
     k_r_per_s: float
-    k_r_sigma_per_s: float
+    k_r_per_s_sigma: float
     amplitude: float
     amplitude_sigma: float
     k_e_per_s: FloatArray
-    k_e_sigma_per_s: FloatArray
+    k_e_per_s_sigma: FloatArray
     kinetic_order: float = 1.0
     kinetic_order_sigma: float = 0.0
     is_level_known: bool = True
@@ -137,12 +137,12 @@ class ExcitedState:
     @property
     def seen(self) -> BoolArray:
         """Whether excitation by each band is detected, shape (B,); else k_e is an upper limit."""
-        return self.k_e_per_s > RATE_LIMIT_SIGMA * self.k_e_sigma_per_s
+        return self.k_e_per_s > RATE_LIMIT_SIGMA * self.k_e_per_s_sigma
 
     @property
     def k_e_upper_per_s(self) -> FloatArray:
         """Upper limit of k_e in 1/s with 95 % probability, shape (B,)."""
-        return self.k_e_per_s + UPPER_SIGMAS * self.k_e_sigma_per_s
+        return self.k_e_per_s + UPPER_SIGMAS * self.k_e_per_s_sigma
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ class ConcentrationAtOff:
     amplitude, amplitude_sigma
         Amplitudes a = Λ* k_r r(0)ᵇ of the decay from there, which are better determined than their
         factors, shape (N,).
-    decay_time_s, decay_time_sigma_s
+    decay_time_s, decay_time_s_sigma
         τ of the decay from there, a (1 + t/τ)^(−b/(b − 1)) with τ = 1/((b − 1) k_r r(0)^(b − 1)),
         as `labrig fit charge` states it; 1/k_r of the first order, shape (N,).
     """
@@ -204,7 +204,7 @@ class ConcentrationAtOff:
     amplitude: FloatArray
     amplitude_sigma: FloatArray
     decay_time_s: FloatArray
-    decay_time_sigma_s: FloatArray
+    decay_time_s_sigma: FloatArray
 
 
 @dataclass(frozen=True, eq=False)

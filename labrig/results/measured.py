@@ -300,7 +300,7 @@ def field_unit(name: str) -> str:
     Examples
     --------
     >>> from labrig.results import field_unit
-    >>> field_unit("k_r_sigma_per_s"), field_unit("centre_nm"), field_unit("chi2")
+    >>> field_unit("k_r_per_s_sigma"), field_unit("centre_nm"), field_unit("chi2")
     ('1/s', 'nm', '')
     """
     base = name.removesuffix("_sigma").replace("_sigma_", "_")

@@ -97,7 +97,7 @@ class SharedDecay:
     def rates(self) -> tuple[Measured, ...]:
         """Rates of all tables in 1/s, falling."""
         return tuple(
-            Measured(state.k_r_per_s, state.k_r_sigma_per_s, "1/s")
+            Measured(state.k_r_per_s, state.k_r_per_s_sigma, "1/s")
             for state in self.tables[0].states
         )
 
@@ -108,7 +108,7 @@ class SharedDecay:
             "schema_version": 1,
             "n_states": len(self.rates),
             "rates": [
-                {"k_r_per_s": rate.value, "k_r_sigma_per_s": rate.sigma} for rate in self.rates
+                {"k_r_per_s": rate.value, "k_r_per_s_sigma": rate.sigma} for rate in self.rates
             ],
             "tables": [
                 asdict(table) | {"amplitudes": [measured_number(a) for a in table.amplitudes]}

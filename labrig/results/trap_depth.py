@@ -21,7 +21,7 @@ class TrapDepth:
 
     Attributes
     ----------
-    temperature_c, rate_per_s, rate_sigma_per_s
+    temperature_c, rate_per_s, rate_per_s_sigma
         Temperatures in °C, rising, and rates with σ in 1/s, shape (n,).
     temperature_sigma_k
         σ of each temperature in K.
@@ -40,7 +40,7 @@ class TrapDepth:
 
     temperature_c: FloatArray
     rate_per_s: FloatArray
-    rate_sigma_per_s: FloatArray
+    rate_per_s_sigma: FloatArray
     temperature_sigma_k: float
     depth_ev: Measured
     log10_frequency: Measured
@@ -94,7 +94,7 @@ class TrapDepth:
             {
                 "temperature_c": self.temperature_c.tolist(),
                 "k_r_per_s": self.rate_per_s.tolist(),
-                "k_r_sigma_per_s": self.rate_sigma_per_s.tolist(),
+                "k_r_per_s_sigma": self.rate_per_s_sigma.tolist(),
                 "temperature_sigma_k": self.temperature_sigma_k,
                 "depth_ev": _number(self.depth_ev),
                 "budgets": {"depth": self.budget().to_dict()},

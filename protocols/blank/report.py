@@ -40,8 +40,8 @@ def _section(result: BlankResult) -> Section:
     rows = tuple(
         (
             name,
-            plus_minus(file.constant_dn_per_s[number], file.constant_sigma_dn_per_s[number]),
-            plus_minus(file.ambient_dn_per_s[number], file.ambient_sigma_dn_per_s[number]),
+            plus_minus(file.constant_dn_per_s[number], file.constant_dn_per_s_sigma[number]),
+            plus_minus(file.ambient_dn_per_s[number], file.ambient_dn_per_s_sigma[number]),
         )
         for number, name in enumerate(channels)
     )
@@ -104,8 +104,8 @@ def _lines(file: BlankFile) -> Iterator[str]:
         else f"free of the turn-off transient from {rounded(clean, 3)} s after lamp off"
     )
     for name, level, sigma in (
-        ("background", file.constant_dn_per_s, file.constant_sigma_dn_per_s),
-        ("stray light", file.ambient_dn_per_s, file.ambient_sigma_dn_per_s),
+        ("background", file.constant_dn_per_s, file.constant_dn_per_s_sigma),
+        ("stray light", file.ambient_dn_per_s, file.ambient_dn_per_s_sigma),
     ):
         channel_levels = zip(file.channels, level, sigma, strict=True)
         yield f"{name}: {', '.join(f'{n} {plus_minus(v, s)}' for n, v, s in channel_levels)} DN/s"

@@ -72,10 +72,10 @@ class BlankResult(RunResult):
         budgets = {}
         for number, channel in enumerate(file.channels):
             constant = Measured(
-                file.constant_dn_per_s[number], file.constant_sigma_dn_per_s[number], "DN/s"
+                file.constant_dn_per_s[number], file.constant_dn_per_s_sigma[number], "DN/s"
             )
             leak = Measured(
-                file.ambient_dn_per_s[number], file.ambient_sigma_dn_per_s[number], "DN/s"
+                file.ambient_dn_per_s[number], file.ambient_dn_per_s_sigma[number], "DN/s"
             )
             budgets[f"constant light, {channel}"] = Budget.of(constant)
             budgets[f"light in the dark frames, {channel}"] = Budget.of(

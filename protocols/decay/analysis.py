@@ -243,7 +243,7 @@ def _material(
         states=tuple(
             State(
                 k_r_per_s=state.k_r_per_s,
-                k_r_per_s_sigma=_finite(state.k_r_sigma_per_s),
+                k_r_per_s_sigma=_finite(state.k_r_per_s_sigma),
                 amplitude=_finite(state.amplitude),
                 amplitude_sigma=_finite(state.amplitude_sigma),
                 amplitude_unit=fit.value_unit or None,

@@ -252,7 +252,7 @@ def white_through_filters(reduction: PatchReduction, select: CameraFilters) -> F
 
 def _steady(frames: FilterFrames) -> FloatArray:
     """Return the weighted mean of frames of a steady light and its σ, (2, m); NaN if all clip."""
-    variance = frames.sigma_dn_per_s**2 + frames.dark_sigma_dn_per_s**2
+    variance = frames.sigma_dn_per_s**2 + frames.dark_dn_per_s_sigma**2
     is_known = np.isfinite(variance) & np.isfinite(frames.value_dn_per_s)
     weight = np.where(is_known, 1 / np.where(is_known, variance, 1.0), 0.0)
     total = weight.sum(axis=0)
@@ -325,7 +325,7 @@ def _scaled(frames: FilterFrames, factor: float) -> FilterFrames:
         frames,
         value_dn_per_s=factor * frames.value_dn_per_s,
         sigma_dn_per_s=factor * frames.sigma_dn_per_s,
-        dark_sigma_dn_per_s=factor * frames.dark_sigma_dn_per_s,
+        dark_dn_per_s_sigma=factor * frames.dark_dn_per_s_sigma,
     )
 
 
@@ -333,7 +333,7 @@ def _side_by_side(parts: Sequence[FilterFrames]) -> FilterFrames:
     """Return frames of the same times as frames with the values of all."""
     columns = [
         np.concatenate([getattr(part, name) for part in parts], axis=1)
-        for name in ("value_dn_per_s", "sigma_dn_per_s", "dark_sigma_dn_per_s")
+        for name in ("value_dn_per_s", "sigma_dn_per_s", "dark_dn_per_s_sigma")
     ]
     return FilterFrames(parts[0].t_s, *columns)
 

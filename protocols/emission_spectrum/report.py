@@ -85,7 +85,7 @@ def _resolved(patch: PatchSpectrum) -> str:
 
 def _shift(comparison: SpectralComparison) -> str:
     """Return the shift of the centroid with its σ in nm, as text."""
-    return plus_minus(comparison.shift_nm, comparison.shift_sigma_nm)
+    return plus_minus(comparison.shift_nm, comparison.shift_nm_sigma)
 
 
 def _sections(patch: PatchSpectrum) -> Iterator[Section]:
@@ -242,7 +242,7 @@ def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) ->
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     axes.axhline(0.0, color=MUTED, linewidth=0.9)
     shift = np.array([comparison.shift_nm for comparison in comparisons])
-    sigma = np.array([comparison.shift_sigma_nm for comparison in comparisons])
+    sigma = np.array([comparison.shift_nm_sigma for comparison in comparisons])
     error_bars(axes, t_s, shift, sigma, INK)
     points(axes, t_s, shift, "o", INK, INK)
     axes.set_xscale("log")

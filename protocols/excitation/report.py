@@ -176,7 +176,7 @@ def _state_line(fit: FittedExcitation, number: int) -> str:
     """Return what is known of a state: its rates, or what its decay after this charge tells."""
     state, off = fit.states[number], fit.at_off[-1]
     r0 = plus_minus(float(off.r0[number]), float(off.r0_sigma[number]))
-    k_r = plus_minus(state.k_r_per_s, state.k_r_sigma_per_s)
+    k_r = plus_minus(state.k_r_per_s, state.k_r_per_s_sigma)
     order = state.order.plus_minus
     if state.exponent is None:
         held = f", b {order} with 95 %" if isinstance(state.order, OneSided) else ""
@@ -184,7 +184,7 @@ def _state_line(fit: FittedExcitation, number: int) -> str:
     if state.is_level_known:
         return f"k_r {k_r} /s, b {order}, r(0) {r0}"
     amplitude = plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number]))
-    time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_sigma_s[number]))
+    time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_s_sigma[number]))
     exponent = plus_minus(state.exponent.value, state.exponent.sigma)
     return (
         f"b {order}; after the brightest charge by the lamp itself a {amplitude} DN/s, τ {time} s, "
@@ -217,7 +217,7 @@ def _rates(fit: FittedExcitation, number: int) -> list[str]:
     It is in 1/s, or over the largest band's where only that is known.
     """
     state = fit.states[number]
-    columns = (state.k_e_per_s, state.k_e_sigma_per_s, state.seen, state.k_e_upper_per_s)
+    columns = (state.k_e_per_s, state.k_e_per_s_sigma, state.seen, state.k_e_upper_per_s)
     if not state.is_apart:
         value, sigma = fit.relative_k_e(number)
         columns = value, sigma, value > RATE_LIMIT_SIGMA * sigma, value + UPPER_SIGMAS * sigma
@@ -382,13 +382,13 @@ def _levels_row(fit: FittedExcitation, number: int) -> tuple[str, ...]:
     is_known = state.is_apart
     cells = [
         str(number + 1),
-        plus_minus(state.k_r_per_s, state.k_r_sigma_per_s) if is_known else UNKNOWN,
+        plus_minus(state.k_r_per_s, state.k_r_per_s_sigma) if is_known else UNKNOWN,
         plus_minus(state.amplitude, state.amplitude_sigma) if is_known else UNKNOWN,
         plus_minus(float(off.r0[number]), float(off.r0_sigma[number])) if is_known else UNKNOWN,
         plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number])),
     ]
     if not fit.is_first_order:
-        time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_sigma_s[number]))
+        time = plus_minus(float(off.decay_time_s[number]), float(off.decay_time_s_sigma[number]))
         exponent = state.exponent
         cells += [
             state.order.plus_minus,
@@ -434,7 +434,7 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
         shift = (number - (len(fit.states) - 1) / 2) * 0.16 * widths
         marker, detected = MARKERS[number], state.seen
         x, y = middles + shift, 1e3 * state.k_e_per_s
-        error_bars(axes, x[detected], y[detected], 1e3 * state.k_e_sigma_per_s[detected], colour)
+        error_bars(axes, x[detected], y[detected], 1e3 * state.k_e_per_s_sigma[detected], colour)
         points(axes, x[detected], y[detected], marker, colour, colour, 5.0)
         limits = 1e3 * state.k_e_upper_per_s[~detected]
         axes.plot(x[~detected], limits, linestyle="none", marker=7, markersize=6, color=colour)

@@ -113,7 +113,7 @@ class ExcitationResult(RunResult):
     >>> result = labrig.read_result(run)  # doctest: +SKIP
     >>> for patch in result.patches.values():
     ...     for state in patch.fit.states:
-    ...         print(result.irradiance.bands_nm, state.k_e_per_s, state.k_e_sigma_per_s)
+    ...         print(result.irradiance.bands_nm, state.k_e_per_s, state.k_e_per_s_sigma)
     """
 
     kind: ClassVar[str] = "excitation"
@@ -158,10 +158,10 @@ class ExcitationResult(RunResult):
             if not state.is_apart:
                 continue
             of = f"of state {number + 1}"
-            k_r = Measured(state.k_r_per_s, state.k_r_sigma_per_s, "1/s")
+            k_r = Measured(state.k_r_per_s, state.k_r_per_s_sigma, "1/s")
             yield f"k_r {of}", Budget.of(k_r)
             for band in np.flatnonzero(state.seen):
-                k_e = Measured(state.k_e_per_s[band], state.k_e_sigma_per_s[band], "1/s")
+                k_e = Measured(state.k_e_per_s[band], state.k_e_per_s_sigma[band], "1/s")
                 least, largest = fit.k_e_range(number)[:, band].tolist()
                 yield (
                     f"k_e {of}, {edges[band]:.0f}-{edges[band + 1]:.0f} nm",
@@ -210,7 +210,7 @@ class ExcitationResult(RunResult):
             "states": [
                 {
                     "k_r_per_s": state.k_r_per_s,
-                    "k_r_sigma_per_s": state.k_r_sigma_per_s,
+                    "k_r_per_s_sigma": state.k_r_per_s_sigma,
                     "kinetic_order": state.kinetic_order,
                     "kinetic_order_sigma": state.kinetic_order_sigma,
                     "kinetic_order_limit_95": measured_number(state.order).get("limit_95"),
@@ -218,7 +218,7 @@ class ExcitationResult(RunResult):
                     "amplitude_at_full_charge_sigma": state.amplitude_sigma,
                     "k_e_per_s": state.k_e_per_s.tolist(),
                     "k_e_range_per_s": fit.k_e_range(number).tolist(),
-                    "k_e_sigma_per_s": state.k_e_sigma_per_s.tolist(),
+                    "k_e_per_s_sigma": state.k_e_per_s_sigma.tolist(),
                     "k_e_upper_per_s": state.k_e_upper_per_s.tolist(),
                     "r0": float(level_at_off.r0[number]),
                     "r0_sigma": float(level_at_off.r0_sigma[number]),
@@ -226,7 +226,7 @@ class ExcitationResult(RunResult):
                     "amplitude": float(level_at_off.amplitude[number]),
                     "amplitude_sigma": float(level_at_off.amplitude_sigma[number]),
                     "decay_time_s": float(level_at_off.decay_time_s[number]),
-                    "decay_time_sigma_s": float(level_at_off.decay_time_sigma_s[number]),
+                    "decay_time_s_sigma": float(level_at_off.decay_time_s_sigma[number]),
                 }
                 for number, state in enumerate(fit.states)
             ],

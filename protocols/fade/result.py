@@ -29,7 +29,7 @@ class SwitchedFrames:
         noise.
     steady_dn_per_s
         Signal of the steady lamp in DN/s, shape (S,).
-    dark_sigma_dn_per_s
+    dark_dn_per_s_sigma
         σ of the dark level, which all frames share, in DN/s, shape (S,).
     pass_number
         Pass of each frame, counted from 0, shape (n,).
@@ -45,7 +45,7 @@ class SwitchedFrames:
     light_s: FloatArray
     light_sigma_s: FloatArray
     steady_dn_per_s: FloatArray
-    dark_sigma_dn_per_s: FloatArray
+    dark_dn_per_s_sigma: FloatArray
     pass_number: IntArray
     steady_frames: IntArray
     clipped: int

@@ -199,7 +199,7 @@ def _file_of_lights(
         ratio=tuple(ratio.tolist()),
         ratio_sigma=tuple((ratio * np.hypot(scale.relative_sigma, card.common_sigma)).tolist()),
         illuminance_lux=context.protocol.illuminance_lux,
-        illuminance_sigma_lux=_lux_sigma(context.protocol),
+        illuminance_lux_sigma=_lux_sigma(context.protocol),
         source=f"grey card by itself and by selected lights in {card.rounds} rounds, with labrig",
         run=context.run.name,
     )
@@ -312,7 +312,7 @@ def _file(
         ratio_sigma=tuple((ratio * np.hypot(relative, card.common_sigma)).tolist()),
         strip=strip,
         illuminance_lux=context.protocol.illuminance_lux,
-        illuminance_sigma_lux=_lux_sigma(context.protocol),
+        illuminance_lux_sigma=_lux_sigma(context.protocol),
         source=f"grey card by itself and through the LVF in {card.rounds} rounds, with labrig",
         run=context.run.name,
     )
@@ -320,8 +320,8 @@ def _file(
 
 def _lux_sigma(protocol: Irradiance) -> float | None:
     """Return σ of the lux meter's reading; None without one."""
-    if protocol.illuminance_lux is None or protocol.illuminance_sigma_lux is not None:
-        return protocol.illuminance_sigma_lux
+    if protocol.illuminance_lux is None or protocol.illuminance_lux_sigma is not None:
+        return protocol.illuminance_lux_sigma
     return LUX_SIGMA * protocol.illuminance_lux
 
 

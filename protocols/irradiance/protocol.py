@@ -153,7 +153,7 @@ class Irradiance(ConfiguredProtocol):
         Illuminance by the lamp itself at the sample, read from a lux meter in the card's place.
         With it radiances of the material are absolute. Default: not read, and they are relative to
         the lamp.
-    illuminance_sigma_lux
+    illuminance_lux_sigma
         Standard uncertainty of that reading in lux, with the meter's mismatch to the eye (f1′).
         Default: 5 % of it.
     camera
@@ -182,7 +182,7 @@ class Irradiance(ConfiguredProtocol):
     sites: Region = (0.1, 0.4, 0.8, 0.2)
     vector_length: float = Field(1.0, gt=0, allow_inf_nan=False)
     illuminance_lux: float | None = Field(None, gt=0, allow_inf_nan=False)
-    illuminance_sigma_lux: float | None = Field(None, ge=0, allow_inf_nan=False)
+    illuminance_lux_sigma: float | None = Field(None, ge=0, allow_inf_nan=False)
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)
     integration: DurationS = Field(1.0, gt=0)
@@ -210,7 +210,7 @@ class Irradiance(ConfiguredProtocol):
 
     @model_validator(mode="after")
     def _sigma_of_a_reading(self) -> Self:
-        if self.illuminance_sigma_lux is not None and self.illuminance_lux is None:
+        if self.illuminance_lux_sigma is not None and self.illuminance_lux is None:
             raise ValueError("expected 'illuminance_lux' beside its σ, got nothing")
         return self
 

@@ -133,7 +133,7 @@ def _test(fit: LeastSquaresFit, decays: int) -> OrderTest | None:
     return OrderTest(
         light=np.exp(log_light),
         rate_per_s=np.exp(log_rate),
-        rate_sigma_per_s=np.exp(log_rate) * np.sqrt(np.diag(of_rates)),
+        rate_per_s_sigma=np.exp(log_rate) * np.sqrt(np.diag(of_rates)),
         shape=Measured(float(fit.parameters[0]), shape_sigma),
         shift=Measured(shift, shift_sigma),
         difference_sigma=float(np.sqrt(difference @ both @ difference)),

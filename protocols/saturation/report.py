@@ -209,7 +209,7 @@ def _order_figure(test: OrderTest) -> Figure:
     """Draw the rate at lamp off over the light there, and the power law through it."""
     figure = new_figure(256.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
-    error_bars(axes, test.light, test.rate_per_s, test.rate_sigma_per_s, INK)
+    error_bars(axes, test.light, test.rate_per_s, test.rate_per_s_sigma, INK)
     points(axes, test.light, test.rate_per_s, MARKERS[0], INK, INK)
     middle = float(np.exp(np.log(test.rate_per_s).mean()))
     light = np.geomspace(test.light.min(), test.light.max(), 64)

@@ -138,7 +138,7 @@ class OrderTest:
     ----------
     light
         Signal of every decay at lamp off in DN/s, shape (d,).
-    rate_per_s, rate_sigma_per_s
+    rate_per_s, rate_per_s_sigma
         Relative fall R of the signal at lamp off and its standard uncertainty in 1/s, shape (d,).
     shape
         Exponent u of the common shape, 0 of an exponential; (b − 1)/b of a state of order b.
@@ -152,7 +152,7 @@ class OrderTest:
 
     light: FloatArray
     rate_per_s: FloatArray
-    rate_sigma_per_s: FloatArray
+    rate_per_s_sigma: FloatArray
     shape: Measured
     shift: Measured
     difference_sigma: float

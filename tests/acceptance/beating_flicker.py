@@ -87,7 +87,7 @@ def line(n_states: int, fits: Sequence[DecayFit]) -> str:
     """Return the figures of fits of the same decay."""
     true = np.array(STATES[n_states][0])
     pulls = np.array(
-        [[(s.k_r_per_s - k) / s.k_r_sigma_per_s for s, k in zip(fit.states, true, strict=True)]
+        [[(s.k_r_per_s - k) / s.k_r_per_s_sigma for s, k in zip(fit.states, true, strict=True)]
          for fit in fits]
     )  # fmt: skip
     wrong = (np.abs(pulls) > WRONG_SIGMAS).any(axis=1)

@@ -148,7 +148,7 @@ def report(case: Case, fits: list[tuple[DecayFit, truths.Observed]]) -> str:
         return text
     truth = np.array([k for k, _ in case.states])
     rates = np.array([[state.k_r_per_s for state in fit.states] for fit in right])
-    sigma = np.array([[state.k_r_sigma_per_s for state in fit.states] for fit in right])
+    sigma = np.array([[state.k_r_per_s_sigma for state in fit.states] for fit in right])
     pulls = (rates - truth) / sigma
     flicker = case.observation.get("flicker", 0.007)
     bound = truths.fisher_rate_sigma(case.states, fits[0][1], flicker)

@@ -200,7 +200,7 @@ def lines(sample: str, outcomes: Sequence[Outcome]) -> Iterator[str]:
     wrong = len(outcomes) - len(right)
     fits = [one.fit for one in right if one.fit is not None]
     found = np.array([[state.k_r_per_s for state in fit.states] for fit in fits])
-    sigma = np.array([[state.k_r_sigma_per_s for state in fit.states] for fit in fits])
+    sigma = np.array([[state.k_r_per_s_sigma for state in fit.states] for fit in fits])
     bound = np.array([one.bound for one in right])
     error = found - true
     pull = error / sigma

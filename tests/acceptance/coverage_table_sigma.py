@@ -117,7 +117,7 @@ def coverage(decay: Decay, noise: Noise, n_values: int, seeds: range) -> Coverag
             continue
         ratios.append((fit.sigma[:, 0] / true_sigma)[signal > FAINT])
         if fit.n_states == decay.states:
-            relative = [state.k_r_sigma_per_s / state.k_r_per_s for state in fit.states]
+            relative = [state.k_r_per_s_sigma / state.k_r_per_s for state in fit.states]
             pulls.append((np.log([state.k_r_per_s for state in fit.states]) - truth) / relative)
     mean_square = float(np.mean(np.square(ratios)))
     return Coverage(float(np.sqrt(mean_square)), np.array(pulls), len(seeds) - len(pulls))
@@ -281,7 +281,7 @@ def broken_pulls(case: Broken, seeds: range) -> tuple[FloatArray, float]:
             said += any(each in text for each in case.said for text in given)
             if fit.n_states == len(case.rates):
                 rates = zip(fit.states, case.rates, strict=True)
-                pulls.append([(state.k_r_per_s - k) / state.k_r_sigma_per_s for state, k in rates])
+                pulls.append([(state.k_r_per_s - k) / state.k_r_per_s_sigma for state, k in rates])
     return np.array(pulls), said / len(seeds)
 
 

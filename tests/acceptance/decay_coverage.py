@@ -123,7 +123,7 @@ def pulls(truth: Truth, fits: Iterable[DecayFit]) -> FloatArray:
     else:
         states = [each.states for each in fits if each.n_states == truth.n_states]
         found = np.array([[state.k_r_per_s for state in each] for each in states])
-        sigma = np.array([[state.k_r_sigma_per_s for state in each] for each in states])
+        sigma = np.array([[state.k_r_per_s_sigma for state in each] for each in states])
     return np.asarray((found - truth.parameters) / sigma)
 
 
@@ -187,7 +187,7 @@ def hidden_line(truth: Truth, share: float, fits: list[DecayFit]) -> str:
 
 def _off_and_stated(truth: Truth, each: DecayFit) -> tuple[FloatArray, FloatArray]:
     """Return errors of the slow rates, and what an unseen state is said to change, both in σ."""
-    rates = np.array([(state.k_r_per_s, state.k_r_sigma_per_s) for state in each.states])
+    rates = np.array([(state.k_r_per_s, state.k_r_per_s_sigma) for state in each.states])
     unseen = each.unseen_state
     changes = np.zeros(each.n_states) if unseen is None else np.abs(unseen.rate_changes)
     off = np.abs(rates[:, 0] - truth.parameters[-each.n_states :])

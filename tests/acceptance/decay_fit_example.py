@@ -33,7 +33,7 @@ def main() -> None:
         print(f"{law.name}: BIC {law.bic:.0f}")
     print("\nWithout flicker in the data:")
     steady = fit_of(cell.replace(FLICKER, STEADY))
-    ratio = fit.states[0].k_r_sigma_per_s / steady.states[0].k_r_sigma_per_s
+    ratio = fit.states[0].k_r_per_s_sigma / steady.states[0].k_r_per_s_sigma
     print(f"σ of the faster rate is {ratio:.2f} times smaller")
 
 

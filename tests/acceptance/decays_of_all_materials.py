@@ -58,7 +58,7 @@ def pulls(fit: dict[str, object], material: str) -> Iterator[float]:
     """(found − true) / σ of each rate, if the number of states is right."""
     true = sorted((state.k_r_per_s for state in read_material(material).states), reverse=True)
     for state, k_r_per_s in zip(fit["states"], true, strict=True):  # type: ignore[call-overload]
-        yield (state["k_r_per_s"] - k_r_per_s) / state["k_r_sigma_per_s"]
+        yield (state["k_r_per_s"] - k_r_per_s) / state["k_r_per_s_sigma"]
 
 
 def main() -> None:
@@ -116,7 +116,7 @@ def assessment(fit: dict[str, object], material: str) -> str:
         true = len(read_material(material).states)
         return f"{said}  WRONG n (true {true})  {fit['states']} {fit['warnings']}"
     rates = "  ".join(
-        f"k {state['k_r_per_s']:.5f} ± {state['k_r_sigma_per_s']:.5f} ({pull:+.1f} σ)"
+        f"k {state['k_r_per_s']:.5f} ± {state['k_r_per_s_sigma']:.5f} ({pull:+.1f} σ)"
         for state, pull in zip(fit["states"], pulls(fit, material), strict=True)  # type: ignore[call-overload]
     )
     return f"{said}  {rates}  {fit['warnings'] or ''}"

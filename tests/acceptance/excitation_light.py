@@ -173,7 +173,7 @@ def measured(case: Case, material: str, seed: int) -> Outcome:
     assert closure is not None
     assert fit.by_band is not None
     truth = np.array([state.k_e_per_s for state in bench.material.states])
-    sigma = np.array([state.k_e_sigma_per_s for state in fit.states])
+    sigma = np.array([state.k_e_per_s_sigma for state in fit.states])
     strong = truth >= STRONG_PER_S
     return Outcome(
         (fit.k_e() - truth)[strong],

@@ -47,9 +47,9 @@ def deviations(found: FittedExcitation, bench: Bench) -> FloatArray:
     ):
         k_e = np.array(truth.k_e_per_s)
         rows += [
-            (state.k_r_per_s - truth.k_r_per_s) / state.k_r_sigma_per_s,
+            (state.k_r_per_s - truth.k_r_per_s) / state.k_r_per_s_sigma,
             (state.amplitude - full) / state.amplitude_sigma,
-            *((state.k_e_per_s - k_e) / state.k_e_sigma_per_s),
+            *((state.k_e_per_s - k_e) / state.k_e_per_s_sigma),
         ]
     return np.array(rows)
 
@@ -69,7 +69,7 @@ def table() -> None:
         worst = np.abs(deviations(found, bench)[: 2 + int(strong.sum())]).max()
         level = found.at_off[0]
         print(
-            f"{name:<16}{state.k_r_per_s:>10.5f}{state.k_r_sigma_per_s:>10.5f}"
+            f"{name:<16}{state.k_r_per_s:>10.5f}{state.k_r_per_s_sigma:>10.5f}"
             f"{level.r0[0]:>8.3f}{level.r0_sigma[0]:>8.3f}{worst:>9.1f}{100 * off.max():>9.1f}"
         )
 

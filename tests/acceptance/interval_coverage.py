@@ -158,12 +158,12 @@ def excitation(name: str, order: float, irradiance: float) -> Case:
         fit = fit_excitation(series, *start, near, None, "all")
         (found,) = fit.states
         own = {
-            "k_r_per_s 1": Measured(found.k_r_per_s, found.k_r_sigma_per_s),
+            "k_r_per_s 1": Measured(found.k_r_per_s, found.k_r_per_s_sigma),
             "kinetic_order 1": Measured(found.kinetic_order, found.kinetic_order_sigma),
         }
         for band in (1, 2, 3, 5):
             own[f"k_e_per_s 1 {band}"] = Measured(
-                float(found.k_e_per_s[band - 1]), float(found.k_e_sigma_per_s[band - 1])
+                float(found.k_e_per_s[band - 1]), float(found.k_e_per_s_sigma[band - 1])
             )
         return {key: (value, fit.intervals.get(key)) for key, value in own.items()}
 

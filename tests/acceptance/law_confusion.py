@@ -309,7 +309,7 @@ def outcome(name: str, seed: int, sample: Sample, seen: Series) -> Outcome:
         is_right=fit.law in sample.right and (states or not sample.rates_per_s),
         is_tie_said="laws-tied" in codes(fit.warnings),
         rate_pulls=[
-            (state.k_r_per_s - k) / state.k_r_sigma_per_s
+            (state.k_r_per_s - k) / state.k_r_per_s_sigma
             for state, k in zip(fit.states, sample.rates_per_s, strict=False)
         ]
         if states

@@ -101,7 +101,7 @@ def outcome(bench: Bench, seed: int, reflectance: PatchReflectance | None = None
     falling = np.argsort(-k_r)
     truth = np.array([state.k_e_per_s for state in bench.material.states])[falling]
     whole_truth = (bench.amplitudes() / k_r)[falling]
-    k_e, sigma = fit.k_e(), np.array([state.k_e_sigma_per_s for state in fit.states])
+    k_e, sigma = fit.k_e(), np.array([state.k_e_per_s_sigma for state in fit.states])
     strong = (truth >= STRONG_PER_S) & np.array([state.seen for state in fit.states])
     room = SIGMAS * sigma * layer.k_e_factor
     low, high = k_e * layer.k_e_factor[0] - room[0], k_e * layer.k_e_factor[1] + room[1]

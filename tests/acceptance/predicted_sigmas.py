@@ -118,7 +118,7 @@ def fitted(case: Case, day: int) -> Fitted:
         return Fitted([], [], told=False)
     return Fitted(
         [state.k_r_per_s for state in fit.states],
-        [state.k_r_sigma_per_s for state in fit.states],
+        [state.k_r_per_s_sigma for state in fit.states],
         fit_series(series).n_states == case.states,
     )
 
@@ -138,7 +138,7 @@ def lines(case: Case, said: dict[str, Any], fits: list[Fitted]) -> list[str]:
     made = []
     for i, state in enumerate(said["states"]):
         rates = np.array([fit.rates[i] for fit in complete])
-        expected = state["rate_sigma_per_s"]
+        expected = state["rate_per_s_sigma"]
         enough = len(rates) > 2
         scatter = rates.std(ddof=1) if enough else np.nan
         own = np.median([fit.sigmas[i] for fit in complete]) if enough else np.nan

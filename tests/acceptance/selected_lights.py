@@ -60,7 +60,7 @@ def run(folder: Path, kind: str, seed: int, excitation: str) -> tuple[list[float
     result = process_run(glow)
     assert isinstance(result, ExcitationResult)
     (patch,) = result.patches.values()
-    ((k_e, sigma),) = [(state.k_e_per_s, state.k_e_sigma_per_s) for state in patch.fit.states]
+    ((k_e, sigma),) = [(state.k_e_per_s, state.k_e_per_s_sigma) for state in patch.fit.states]
     truth = LAMP * true_means(bands_nm, excitation)
     large = truth > LARGE
     pulls = (k_e - truth) / np.maximum(sigma, 1e-300)

@@ -226,7 +226,7 @@ def _stated(case: Case, result: RunResult, truth: Truth) -> Iterator[tuple[str, 
             changes += np.abs(np.transpose([unseen.rate_changes, unseen.amplitude_changes]))
         for state, (rate, amplitude) in zip(patch.fit.states, changes, strict=True):
             true = min(truth.patches[0].states, key=lambda each: _apart(state, each))
-            yield f"k {true.k_r_per_s:.2g}", rate * state.k_r_per_s / state.k_r_sigma_per_s
+            yield f"k {true.k_r_per_s:.2g}", rate * state.k_r_per_s / state.k_r_per_s_sigma
             yield f"a {true.k_r_per_s:.2g}", amplitude * state.amplitude / state.amplitude_sigma
 
 
@@ -294,7 +294,7 @@ def _state_errors(fit: FittedDecay, truth: Truth, number: int, lens: float) -> d
         assert nearest.amplitude_dn_per_s is not None
         amplitude = lens * nearest.amplitude_dn_per_s[channel]
         k = nearest.k_r_per_s
-        errors[f"k {k:.2g}"] = (state.k_r_per_s - k, state.k_r_sigma_per_s, k)
+        errors[f"k {k:.2g}"] = (state.k_r_per_s - k, state.k_r_per_s_sigma, k)
         errors[f"a {k:.2g}"] = (state.amplitude - amplitude, state.amplitude_sigma, amplitude)
     return errors
 

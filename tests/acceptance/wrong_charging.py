@@ -119,12 +119,12 @@ class Charging:
             yield f"state of {state.k_r_per_s:.2g} /s", (np.inf, 1.0, 1.0)
         state = states[0]
         k = true.k_r_per_s
-        yield "k_r", (state.k_r_per_s - k, state.k_r_sigma_per_s, k)
+        yield "k_r", (state.k_r_per_s - k, state.k_r_per_s_sigma, k)
         k_e_per_s = read_material(self.material(0)).states[0].k_e_per_s
         assert k_e_per_s is not None
         for band, k_e in enumerate(k_e_per_s):
             found = state.k_e_per_s[band] / self.lamp
-            sigma = state.k_e_sigma_per_s[band] / self.lamp
+            sigma = state.k_e_per_s_sigma[band] / self.lamp
             yield f"k_e {band + 1}", (found - k_e, sigma, max(k_e_per_s))
         level, r0 = patch.fit.at_off[-1], true.concentration
         assert r0 is not None

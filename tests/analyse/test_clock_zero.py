@@ -37,7 +37,7 @@ def numbers(fit: FittedDecay) -> Sequence[tuple[float, float]]:
         pair
         for state in fit.states
         for pair in (
-            (state.k_r_per_s, state.k_r_sigma_per_s),
+            (state.k_r_per_s, state.k_r_per_s_sigma),
             (state.amplitude, state.amplitude_sigma),
         )
     ]

@@ -363,7 +363,7 @@ def test_a_shift_by_a_nanometre_is_found_and_measured() -> None:
     before = combined(glow(0, np.array([1.0, 0.5]), SHAPE))
     found = compared("later", glow(1, np.array([0.3]), moved), before, POSITIONS_NM)
     assert differ([found])
-    assert abs(found.shift_nm - 1.0) < 4 * found.shift_sigma_nm
+    assert abs(found.shift_nm - 1.0) < 4 * found.shift_nm_sigma
     assert found.brightness == pytest.approx(0.3, rel=0.02)
     assert found.beyond_noise == pytest.approx(0.025, rel=0.5)
 

@@ -104,4 +104,4 @@ def test_a_whole_phosphor_without_an_lvf(tmp_path: Path) -> None:
     assert patch.material.spectrum is not None
     (truth,) = 4 * true_rates("yellow-paint")
     (state,) = patch.fit.states
-    assert (np.abs(state.k_e_per_s - truth) < 3.5 * state.k_e_sigma_per_s + 1e-5).all()
+    assert (np.abs(state.k_e_per_s - truth) < 3.5 * state.k_e_per_s_sigma + 1e-5).all()

@@ -74,7 +74,7 @@ def test_calibrated_it_is_subtracted(camera: CameraFile, tmp_path: Path) -> None
     assert result.warnings == ()
     for name, material in (("bright", "blue-paint"), ("dim", "red-paint")):
         (state,), (true,) = result.patches[name].fit.states, read_material(material).states
-        assert abs(state.k_r_per_s - true.k_r_per_s) < 2.5 * state.k_r_sigma_per_s
+        assert abs(state.k_r_per_s - true.k_r_per_s) < 2.5 * state.k_r_per_s_sigma
 
 
 def test_not_calibrated_a_line_names_the_dim_patch(tmp_path: Path) -> None:

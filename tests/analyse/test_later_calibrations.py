@@ -26,8 +26,8 @@ def test_one_that_came_later_is_used_and_recorded(tmp_path: Path) -> None:
         "rate_dn_per_s": ((0.0,) * 3,) * 2,
         "sigma_dn_per_s": ((1.0,) * 3,) * 2,
         "constant_dn_per_s": (0.0,) * 3,
-        "constant_sigma_dn_per_s": (1.0,) * 3,
-        "ambient_sigma_dn_per_s": (0.1,) * 3,
+        "constant_dn_per_s_sigma": (1.0,) * 3,
+        "ambient_dn_per_s_sigma": (0.1,) * 3,
     }
     BLANK_KIND.write(tmp_path, BLANK.model_copy(update=three | leaking))
     assert "stray-light" not in codes(process_run(run).warnings)

@@ -149,7 +149,7 @@ def test_a_reading_in_lux_gives_watts() -> None:
 
 
 def test_the_reading_and_the_cards_light_are_in_the_file(irradiance: IrradianceFile) -> None:
-    assert (irradiance.illuminance_lux, irradiance.illuminance_sigma_lux) == (1000, 50)
+    assert (irradiance.illuminance_lux, irradiance.illuminance_lux_sigma) == (1000, 50)
     assert irradiance.card is not None
     assert irradiance.card.channels == ("R", "G", "B")
     relative = np.array(irradiance.card.sigma_dn_per_s) / irradiance.card.dn_per_s

@@ -154,7 +154,7 @@ def test_a_run_ends_in_a_result_that_agrees_with_itself(labrig: Labrig, finished
     result = finished / "result"
     fit = json.loads((result / "fit.json").read_text())
     (state,) = fit["states"]
-    assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_sigma_per_s"]
+    assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_per_s_sigma"]
     material = read_quickly((result / "material.yaml").read_text())
     assert material["states"][0]["k_r_per_s"] == state["k_r_per_s"]
     assert material["states"][0]["r0"] is None, "a decay alone does not tell r(0)"
@@ -399,7 +399,7 @@ def test_a_table_of_time_and_value_is_fitted_with_the_defaults(
     assert ended.code == 0, ended.err
     fit = json.loads(ended.out)
     rate = fit["states"][0]
-    assert abs(rate["k_r_per_s"] - 0.05) < 4 * rate["k_r_sigma_per_s"]
+    assert abs(rate["k_r_per_s"] - 0.05) < 4 * rate["k_r_per_s_sigma"]
     assert fit["warnings"] == []
     assert fit["sigma_from_scatter"]["at_brightest"] == pytest.approx(5, rel=0.3)
     assert "from the scatter" in labrig("fit", "decay", tmp_path / "table.csv").out

@@ -85,7 +85,7 @@ def test_the_fit_is_that_of_fit_json_and_leaves_the_residuals_it_says(
         fit = file["entry/fit_sample"]
         (state,) = kept["states"]
         assert fit["parameters/rate"][0] == state["k_r_per_s"]
-        assert fit["parameters/rate_errors"][0] == state["k_r_sigma_per_s"]
+        assert fit["parameters/rate_errors"][0] == state["k_r_per_s_sigma"]
         assert fit["parameters/amplitude"].attrs["units"] == "DN/s"
         assert fit["parameters/covariance"][()].tolist() == kept["covariance"]
         units = fit["parameters/covariance"].attrs["units"]

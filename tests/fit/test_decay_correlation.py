@@ -43,7 +43,7 @@ def fitted(seed: int, correlation: Sequence[Sequence[float]] | np.ndarray | None
 def test_sigma_is_right_where_it_is_known_and_too_small_where_not() -> None:
     def pulls(correlation: np.ndarray | None) -> np.ndarray:
         states = [fitted(seed, correlation).states[0] for seed in range(60)]
-        return np.array([(s.k_r_per_s - RATE) / s.k_r_sigma_per_s for s in states])
+        return np.array([(s.k_r_per_s - RATE) / s.k_r_per_s_sigma for s in states])
 
     known, ignored = pulls(CORRELATION), pulls(None)
     assert 0.8 < known.std() < 1.2
@@ -78,7 +78,7 @@ def test_the_order_of_channels_does_not_matter(r: float, seed: int) -> None:
             flicker=0.004,
             correlation=correlation[np.ix_(order, order)],
         )
-        found.append((fit.states[0].k_r_per_s, fit.states[0].k_r_sigma_per_s))
+        found.append((fit.states[0].k_r_per_s, fit.states[0].k_r_per_s_sigma))
     assert found[0] == pytest.approx(found[1], rel=1e-6)
 
 
@@ -111,7 +111,7 @@ def test_dark_levels_wrong_in_all_channels_alike() -> None:
                 offset_sigma=dark_sigma,
                 offset_correlation=offset_correlation,
             ).states[0]
-            found.append((state.k_r_per_s - RATE) / state.k_r_sigma_per_s)
+            found.append((state.k_r_per_s - RATE) / state.k_r_per_s_sigma)
         return np.array(found)
 
     known, ignored = pulls(common), pulls(None)

@@ -34,7 +34,7 @@ def test_a_state_that_the_timing_hardly_resolves_is_in_sigma_and_named() -> None
     fits = [fit(truth, seed) for seed in range(400, 408)]
     slow = [
         max(
-            abs(state.k_r_per_s - k) / state.k_r_sigma_per_s
+            abs(state.k_r_per_s - k) / state.k_r_per_s_sigma
             for state, k in zip(each.states[-2:], (0.1, 0.02), strict=True)
         )
         for each in fits
@@ -61,7 +61,7 @@ def test_where_no_state_hides_sigma_is_as_small_as_it_can_be() -> None:
         for one in seen
     ]
     bound = truths.fisher_rate_sigma(DOUBLE, seen[0], 0.007)
-    sigma = np.array([[state.k_r_sigma_per_s for state in each.states] for each in fits])
+    sigma = np.array([[state.k_r_per_s_sigma for state in each.states] for each in fits])
     assert (np.median(sigma, axis=0) < 1.1 * bound).all()
     assert sum(_warns(each, "state-hidden") for each in fits) <= 1
 
@@ -182,7 +182,7 @@ def test_the_drift_of_a_lamp_is_in_sigma() -> None:
             n_states=1,
         )
         told += _warns(each, "noise-correlated")
-        pulls.append((each.states[0].k_r_per_s - 0.02) / each.states[0].k_r_sigma_per_s)
+        pulls.append((each.states[0].k_r_per_s - 0.02) / each.states[0].k_r_per_s_sigma)
     # Correlations that are averaged over make σ a tenth too large: 0.9.
     assert 0.75 < np.sqrt(np.mean(np.square(pulls))) < 1.1
     assert told > 50
@@ -215,7 +215,7 @@ def test_a_memory_of_a_frame_is_in_sigma() -> None:
     fits = [_with_memory(seed, 0.37, 0.0) for seed in range(3000, 3060)]
     assert_sigma_is_right(
         [
-            (state.k_r_per_s - k) / state.k_r_sigma_per_s
+            (state.k_r_per_s - k) / state.k_r_per_s_sigma
             for each in fits
             for state, (k, _) in zip(each.states, DOUBLE, strict=True)
         ]
@@ -267,6 +267,6 @@ def test_few_counts_are_not_biased(tmp_path: Path) -> None:
         table.write_text("\n".join(["t_s,counts", *rows]) + "\n")
         options = TableFitOptions(states=1, weights="counts", flicker="0")
         state = fit_table(table, options)[0].fit.states[0]
-        pulls.append((state.k_r_per_s - 0.03) / state.k_r_sigma_per_s)
+        pulls.append((state.k_r_per_s - 0.03) / state.k_r_per_s_sigma)
     # The standard error of the mean is 0.25.
     assert abs(np.mean(pulls)) < 0.6

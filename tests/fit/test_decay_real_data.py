@@ -23,7 +23,7 @@ def test_halves_of_a_time_resolved_luminescence_agree(real_data: Path, level: in
                   offset_sigma=np.inf).states[-1]
         for half in (0, 1)
     )  # fmt: skip
-    sigma = np.hypot(even.k_r_sigma_per_s, odd.k_r_sigma_per_s)
+    sigma = np.hypot(even.k_r_per_s_sigma, odd.k_r_per_s_sigma)
     assert abs(even.k_r_per_s - odd.k_r_per_s) < 3 * sigma
     assert sigma < 0.05 * even.k_r_per_s
 

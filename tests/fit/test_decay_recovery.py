@@ -138,7 +138,7 @@ def test_fixed_rate_is_held_and_drops_out_of_the_covariance() -> None:
     truth = ((0.08, 1.0), (0.015, 0.4))
     fit = _fit(_exact(truth, 1.5), fixed_rates=[0.015])
     _assert_recovered(fit, truth)
-    assert fit.states[1].k_r_sigma_per_s == 0
+    assert fit.states[1].k_r_per_s_sigma == 0
     assert not fit.covariance[2].any()
     assert fit.covariance[3, 3] > 0
 
@@ -166,7 +166,7 @@ def test_units_do_not_matter(time_unit: float, value_unit: float) -> None:
     assert there.n_states == here.n_states
     for a, b in zip(here.states, there.states, strict=True):
         assert b.k_r_per_s * time_unit == pytest.approx(a.k_r_per_s, rel=1e-8)
-        assert b.k_r_sigma_per_s * time_unit == pytest.approx(a.k_r_sigma_per_s, rel=1e-6)
+        assert b.k_r_per_s_sigma * time_unit == pytest.approx(a.k_r_per_s_sigma, rel=1e-6)
         assert b.amplitude / value_unit == pytest.approx(a.amplitude, rel=1e-8)
     assert there.bic == pytest.approx(here.bic, rel=1e-8)
 

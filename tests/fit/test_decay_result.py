@@ -40,7 +40,7 @@ def test_json_has_the_contract_keys_in_its_order() -> None:
     assert read["states"][0]["k_r_per_s"] > read["states"][1]["k_r_per_s"]
     assert set(read["states"][0]) == {
         "k_r_per_s",
-        "k_r_sigma_per_s",
+        "k_r_per_s_sigma",
         "amplitude",
         "amplitude_sigma",
     }
@@ -49,7 +49,7 @@ def test_json_has_the_contract_keys_in_its_order() -> None:
     covariance = np.array(read["covariance"])
     assert covariance.shape == (5, 5)
     states = read["states"]
-    sigma = [states[i][key] for i in (0, 1) for key in ("k_r_sigma_per_s", "amplitude_sigma")]
+    sigma = [states[i][key] for i in (0, 1) for key in ("k_r_per_s_sigma", "amplitude_sigma")]
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), [*sigma, read["offset_sigma"]])
     assert read["warnings"] == []
     assert read["reduced_chi2"] == pytest.approx(1, abs=0.4)
@@ -101,8 +101,8 @@ def test_missing_sigma_is_estimated_and_reported() -> None:
     assert fit.scatter.at_brightest == pytest.approx(fit.sigma.max())
     assert fit.warnings == ()
     apart = fit.states[0].k_r_per_s - told.states[0].k_r_per_s
-    assert abs(apart) < 0.3 * told.states[0].k_r_sigma_per_s
-    assert fit.states[0].k_r_sigma_per_s == pytest.approx(told.states[0].k_r_sigma_per_s, rel=0.3)
+    assert abs(apart) < 0.3 * told.states[0].k_r_per_s_sigma
+    assert fit.states[0].k_r_per_s_sigma == pytest.approx(told.states[0].k_r_per_s_sigma, rel=0.3)
 
 
 def test_one_state_too_few_is_a_misfit() -> None:
@@ -159,7 +159,7 @@ def test_flicker_from_too_few_bright_frames_is_reported() -> None:
         fit = fit_decay(seen.t_s, seen.values, seen.sigma, exposure_s=1.5, flicker=None)
         assert "flicker-from-few-frames" in codes(fit.warnings)
         (state,) = fit.states
-        assert abs(state.k_r_per_s - 0.5) < 4.5 * state.k_r_sigma_per_s
+        assert abs(state.k_r_per_s - 0.5) < 4.5 * state.k_r_per_s_sigma
 
 
 def test_flicker_from_few_bright_frames_is_in_sigma() -> None:
@@ -173,7 +173,7 @@ def test_flicker_from_few_bright_frames_is_in_sigma() -> None:
             seen.t_s, seen.values, seen.sigma, exposure_s=1.0, channels="RGB", flicker=None
         )
         (state,) = fit.states
-        pulls.append((state.k_r_per_s - 0.35) / state.k_r_sigma_per_s)
+        pulls.append((state.k_r_per_s - 0.35) / state.k_r_per_s_sigma)
         assert "flicker-from-few-frames" not in codes(fit.warnings)
     assert 0.5 < np.sqrt(np.mean(np.square(pulls))) < 1.3
 
@@ -257,4 +257,4 @@ def test_amplitude_at_lamp_off_is_as_uncertain_as_the_rate_that_leads_there() ->
     (state,) = fit.states
     assert state.amplitude == pytest.approx(best[1], rel=1e-4)
     assert state.amplitude_sigma == pytest.approx(np.sqrt(covariance[1, 1]), rel=0.02)
-    assert state.k_r_sigma_per_s == pytest.approx(np.sqrt(covariance[0, 0]), rel=0.02)
+    assert state.k_r_per_s_sigma == pytest.approx(np.sqrt(covariance[0, 0]), rel=0.02)

@@ -46,7 +46,7 @@ def _fits(
 def _pulls(fits: list[DecayFit], truth: tuple[tuple[float, float], ...]) -> FloatArray:
     return np.array(
         [
-            (state.k_r_per_s - k) / state.k_r_sigma_per_s
+            (state.k_r_per_s - k) / state.k_r_per_s_sigma
             for fit in fits
             for state, (k, _) in zip(fit.states, truth, strict=True)
         ]
@@ -108,7 +108,7 @@ def test_sigma_is_the_cramer_rao_bound() -> None:
     fits = _fits(truths.exponentials(*DOUBLE), range(8), flicker=0.007, n_states=2)
     seen = truths.observe(truths.exponentials(*DOUBLE), 0)
     bound = truths.fisher_rate_sigma(DOUBLE, seen, 0.007)
-    sigma = np.median([[state.k_r_sigma_per_s for state in fit.states] for fit in fits], axis=0)
+    sigma = np.median([[state.k_r_per_s_sigma for state in fit.states] for fit in fits], axis=0)
     # 1.1 % and 0.5 %: docs/physics, "Decay fit".
     np.testing.assert_allclose(bound / [0.08, 0.015], [0.011, 0.005], rtol=0.1)
     np.testing.assert_allclose(sigma / bound, 1, atol=0.07)
@@ -186,7 +186,7 @@ def test_growing_exposures_improve_the_slow_rate() -> None:
             channels="RGB",
             n_states=2,
         )
-        return fit.states[1].k_r_sigma_per_s
+        return fit.states[1].k_r_per_s_sigma
 
     assert sigma(0.25) / sigma(growing_s) > 2
 
@@ -198,7 +198,7 @@ def test_flicker_known_from_few_bright_frames_is_known_badly_and_counted_so() ->
     fits = _fits(truths.exponentials(*truth), range(60))
     pulls = _pulls(fits, truth)
     error = [fit.states[0].k_r_per_s - 0.2 for fit in fits]
-    sigma = [fit.states[0].k_r_sigma_per_s for fit in fits]
+    sigma = [fit.states[0].k_r_per_s_sigma for fit in fits]
     # σ of the ratio: 9 %.
     assert 0.85 < np.sqrt(np.mean(np.square(sigma)) / np.mean(np.square(error))) < 1.35
     assert np.abs(pulls).max() < 4
@@ -247,8 +247,8 @@ def test_two_states_that_fewer_do_not_describe_are_kept_beside_a_free_offset(
     values = np.exp(-0.08 * t_s) + 0.5 * np.exp(-0.01 * t_s) + noise
     fit = fit_decay(t_s, values, 0.01, offset_sigma=np.inf, n_states=asked)
     fast, slow = fit.states
-    assert abs(fast.k_r_per_s - 0.08) < 2 * fast.k_r_sigma_per_s
-    assert abs(slow.k_r_per_s - 0.01) < 2 * slow.k_r_sigma_per_s
+    assert abs(fast.k_r_per_s - 0.08) < 2 * fast.k_r_per_s_sigma
+    assert abs(slow.k_r_per_s - 0.01) < 2 * slow.k_r_per_s_sigma
     assert fit.reduced_chi2 < 1.5
     assert "offset-unresolved" in codes(fit.warnings)
     assert "states-unsupported" not in codes(fit.warnings)

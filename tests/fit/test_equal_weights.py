@@ -28,7 +28,7 @@ RESIDUAL = 2.9923229172e-05
 
 def numbers(fit: FittedDecay) -> np.ndarray:
     return np.array(
-        [[s.k_r_per_s, s.k_r_sigma_per_s, s.amplitude, s.amplitude_sigma] for s in fit.states]
+        [[s.k_r_per_s, s.k_r_per_s_sigma, s.amplitude, s.amplitude_sigma] for s in fit.states]
     )
 
 
@@ -69,7 +69,7 @@ def test_sigma_of_residuals_covers_the_truth() -> None:
     for seed in range(16):
         y = 1e3 * np.exp(-x) + 5 * np.random.default_rng([5, seed]).standard_normal(40)
         state = labrig.fit_decay(x, y, "equal", n_states=1).states[0]
-        squares.append(((state.k_r_per_s - 1) / state.k_r_sigma_per_s) ** 2)
+        squares.append(((state.k_r_per_s - 1) / state.k_r_per_s_sigma) ** 2)
     # 16 squares of Student's t with 38 degrees of freedom: 1.06 ± 0.4.
     assert 0.35 < np.mean(squares) < 2.2
 

@@ -63,7 +63,7 @@ def test_a_state_that_is_not_there_may_lose_its_rate() -> None:
     found = fit_excitation(measured(bench(1.0, seed=7)), [0.05, 1e-5], [0.5, 0.5], UNCERTAIN)
     there, not_there = found.states
     true = read_material("blue-paint").states[0].k_r_per_s
-    assert there.k_r_per_s == pytest.approx(true, abs=4 * there.k_r_sigma_per_s)
+    assert there.k_r_per_s == pytest.approx(true, abs=4 * there.k_r_per_s_sigma)
     assert 0 < not_there.k_r_per_s < 1e-6
     # Rao's test has one degree of freedom for each state.
     assert 0 <= found.order_gain < 20
@@ -106,10 +106,10 @@ def test_order_rates_and_level_of_a_sample() -> None:
     assert state.is_level_known
     assert state.kinetic_order_sigma < 0.05
     assert abs(state.kinetic_order - B) < 3 * state.kinetic_order_sigma
-    assert abs(state.k_r_per_s - truth.k_r_per_s) < 3 * state.k_r_sigma_per_s
+    assert abs(state.k_r_per_s - truth.k_r_per_s) < 3 * state.k_r_per_s_sigma
     assert abs(state.amplitude - sample.amplitudes()[0]) < 3 * state.amplitude_sigma
     off_k_e = state.k_e_per_s - np.array(truth.k_e_per_s)
-    assert (np.abs(off_k_e) < 3 * state.k_e_sigma_per_s + 1e-5).all()
+    assert (np.abs(off_k_e) < 3 * state.k_e_per_s_sigma + 1e-5).all()
     assert found.covariance_parameters[-1] == "kinetic_order 1"
     assert np.sqrt(found.covariance[-1, -1]) == pytest.approx(state.kinetic_order_sigma)
     off = found.at_off[0]
@@ -124,9 +124,9 @@ def test_what_a_weak_charge_does_not_tell_is_not_known() -> None:
     found = fitted(measured(sample), None)
     (state,), off = found.states, found.at_off[0]
     assert not state.is_level_known
-    assert state.k_r_sigma_per_s > 0.3 * state.k_r_per_s
+    assert state.k_r_per_s_sigma > 0.3 * state.k_r_per_s
     assert off.amplitude_sigma[0] < 0.05 * off.amplitude[0]
-    assert off.decay_time_sigma_s[0] < 0.6 * off.decay_time_s[0]
+    assert off.decay_time_s_sigma[0] < 0.6 * off.decay_time_s[0]
     assert "charge-unsaturated" in codes(found.warnings)
 
 

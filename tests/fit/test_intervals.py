@@ -34,7 +34,7 @@ def test_a_state_that_is_well_known_has_its_sigma_only() -> None:
     asked = fitted(ONE, 0.01, n_states=1, intervals=True)
     (state,) = fit.states
     interval = asked.intervals["k_r_per_s 1"]
-    sigma = state.k_r_sigma_per_s
+    sigma = state.k_r_per_s_sigma
     assert interval.high_68 - interval.value == pytest.approx(sigma, rel=0.05)
     assert interval.value - interval.low_95 == pytest.approx(1.96 * sigma, rel=0.05)
     assert asked.states == fit.states
@@ -45,7 +45,7 @@ def test_a_slow_state_that_is_hardly_known_has_an_interval_by_itself(tmp_path: P
     interval, state = fit.intervals["k_r_per_s 2"], fit.states[1]
     assert interval.value == pytest.approx(state.k_r_per_s)
     lifetime = fit.intervals["lifetime_s 2"]
-    assert lifetime.differs_from(state.k_r_sigma_per_s / state.k_r_per_s**2)
+    assert lifetime.differs_from(state.k_r_per_s_sigma / state.k_r_per_s**2)
     assert lifetime.high_95 == pytest.approx(1 / interval.low_95)
     assert "1/k 2 / s" in str(fit)
     path = tmp_path / "fit.json"
@@ -131,7 +131,7 @@ def test_rates_of_excitation_have_limits_about_the_truth() -> None:
     (state,), (truth,) = fit.states, bench.material.states
     interval = fit.intervals["k_r_per_s 1"]
     assert interval.low_95 < truth.k_r_per_s < interval.high_95
-    assert interval.high_68 - interval.low_68 == pytest.approx(2 * state.k_r_sigma_per_s, rel=0.2)
+    assert interval.high_68 - interval.low_68 == pytest.approx(2 * state.k_r_per_s_sigma, rel=0.2)
     for band, k_e in enumerate(truth.k_e_per_s or (), start=1):
         limits = fit.intervals[f"k_e_per_s 1 {band}"]
         assert 0.0 <= limits.low_95 <= limits.value <= limits.high_95

@@ -58,7 +58,7 @@ def test_the_range_of_a_layer_has_the_true_rates_and_the_fit_has_not(
     fit, effect = measured(sample)
     truth = np.array(sample.material.states[0].k_e_per_s)
     strong = truth > 0.004
-    k_e, sigma = fit.states[0].k_e_per_s[strong], fit.states[0].k_e_sigma_per_s[strong]
+    k_e, sigma = fit.states[0].k_e_per_s[strong], fit.states[0].k_e_per_s_sigma[strong]
     assert (np.abs(truth[strong] - k_e) > 5 * sigma).all()
     least, largest = replace(fit, layer=effect).k_e_range(0)[:, strong]
     assert (least - 2 * sigma < truth[strong]).all()

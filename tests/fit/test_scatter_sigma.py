@@ -73,12 +73,12 @@ def test_sigma_has_the_unit_of_the_values_and_their_order() -> None:
     shuffled = rng.permutation(len(T_S))
     other = fit_decay(T_S[shuffled], 1e6 * values[shuffled], None)
     assert other.sigma == pytest.approx(1e6 * fit.sigma[shuffled], rel=1e-6)
-    assert other.states[0].k_r_sigma_per_s == pytest.approx(fit.states[0].k_r_sigma_per_s, rel=1e-6)
+    assert other.states[0].k_r_per_s_sigma == pytest.approx(fit.states[0].k_r_per_s_sigma, rel=1e-6)
 
 
 def test_a_few_values_without_sigma_leave_the_rate_open() -> None:
     fit = fit_decay([0.0, 10.0, 20.0], [1.0, 0.62, 0.35], None)
-    assert np.isinf(fit.states[0].k_r_sigma_per_s)
+    assert np.isinf(fit.states[0].k_r_per_s_sigma)
     assert "sigma-from-few-values" in codes(fit.warnings)
 
 

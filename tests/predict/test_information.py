@@ -146,7 +146,7 @@ def test_fits_that_have_to_measure_their_flicker_report_them(k_r_per_s: float) -
     expected = series(truth)
     own = [
         fitted(expected, truths.observe(truths.exponentials(*truth), seed).values, None)
-        .states[0].k_r_sigma_per_s
+        .states[0].k_r_per_s_sigma
         for seed in MANY
     ]  # fmt: skip
     assert np.median(own) == pytest.approx(information(expected).sigma[0], rel=0.12)

@@ -67,7 +67,7 @@ def predicted(labrig: Labrig, measured: Path, *more: object, **keys: object) -> 
 
 def sigma(said: dict[str, Any]) -> float:
     (patch,) = said["patches"].values()
-    return float(patch["states"][0]["rate_sigma_per_s"])
+    return float(patch["states"][0]["rate_per_s_sigma"])
 
 
 def test_the_run_that_follows_finds_what_was_predicted(labrig: Labrig, measured: Path) -> None:
@@ -77,8 +77,8 @@ def test_the_run_that_follows_finds_what_was_predicted(labrig: Labrig, measured:
     assert said["exposures_s"] == pytest.approx(taken, rel=0.27), "within a third of a stop"
     (found,) = json.loads((run / "result" / "fit.json").read_text())["states"]
     (state,) = said["patches"]["sample"]["states"]
-    assert 1 / 1.2 < found["k_r_sigma_per_s"] / state["rate_sigma_per_s"] < 1.2
-    assert 1 / 1.2 < found["amplitude_sigma"] / state["amplitude_sigma_dn_per_s"] < 1.2
+    assert 1 / 1.2 < found["k_r_per_s_sigma"] / state["rate_per_s_sigma"] < 1.2
+    assert 1 / 1.2 < found["amplitude_sigma"] / state["amplitude_dn_per_s_sigma"] < 1.2
     assert said["patches"]["sample"]["brightness_known"]
     assert sum(state["noise"].values()) == pytest.approx(1)
 
@@ -232,7 +232,7 @@ def test_materials_from_a_paper_can_be_predicted(labrig: Labrig, name: str) -> N
     assert ended.code == 0, ended.err
     states = json.loads(ended.out)["patches"]["sample"]["states"]
     assert len(states) == len(read_material(name).states)
-    assert all(0 < state["rate_sigma_per_s"] < state["rate_per_s"] for state in states)
+    assert all(0 < state["rate_per_s_sigma"] < state["rate_per_s"] for state in states)
 
 
 def test_a_kinetic_order_bends_the_decay_that_is_predicted(labrig: Labrig, tmp_path: Path) -> None:

@@ -195,8 +195,8 @@ def test_a_dark_region_takes_the_place_of_dark_frames(
     assert ended.code == 0, ended.err
     assert read_run(ended.run_folder).frames("dark") == []
     (state,) = json.loads((ended.run_folder / "result" / "fit.json").read_text())["states"]
-    assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_sigma_per_s"]
-    assert state["k_r_sigma_per_s"] < 0.001
+    assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_per_s_sigma"]
+    assert state["k_r_per_s_sigma"] < 0.001
 
 
 def test_repeats_share_one_fit(
@@ -211,6 +211,6 @@ def test_repeats_share_one_fit(
         ended = labrig("run", protocol, "--rig", make_rig(), "--runs", tmp_path / str(repeats))
         assert ended.code == 0, ended.err
         (state,) = json.loads((ended.run_folder / "result" / "fit.json").read_text())["states"]
-        assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_sigma_per_s"]
-        sigmas.append(state["k_r_sigma_per_s"])
+        assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_per_s_sigma"]
+        sigmas.append(state["k_r_per_s_sigma"])
     assert sigmas[1] < 0.75 * sigmas[0]

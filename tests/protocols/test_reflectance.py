@@ -35,7 +35,7 @@ def test_what_cannot_be_is_one_clear_line(tmp_path: Path, keys: dict[str, Any], 
 
 def test_a_lux_reading_is_a_number_with_its_sigma(tmp_path: Path) -> None:
     said = "expected 'illuminance_lux' beside its σ"
-    assert_one_clear_line(written(tmp_path, protocol="irradiance", illuminance_sigma_lux=5), said)
+    assert_one_clear_line(written(tmp_path, protocol="irradiance", illuminance_lux_sigma=5), said)
     assert_one_clear_line(written(tmp_path, protocol="irradiance", illuminance_lux=0), "lux")
 
 

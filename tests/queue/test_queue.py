@@ -99,7 +99,7 @@ def test_a_sweep_is_added_run_and_shown(
         rows = list(csv.DictReader(table))
     assert [row["charge"] for row in rows] == ["16 min", "20 min", "30 min"]
     for row in rows:
-        k, sigma = float(row["k_r_per_s"]), float(row["k_r_sigma_per_s"])
+        k, sigma = float(row["k_r_per_s"]), float(row["k_r_per_s_sigma"])
         assert abs(k - 0.0322) < 4 * sigma
         assert f'href="../runs/{row["run"]}/result/report.html"' in page
     made: list[Any] = [

@@ -128,7 +128,7 @@ def _leaves(content: Any, sigma: Any) -> Iterator[tuple[str, tuple[float, float]
 
 
 def _sigma_beside(content: Mapping[str, Any], key: str) -> Any:
-    """The value of the key that names the σ of `key`: `k_r_sigma_per_s` beside `k_r_per_s`."""
+    """The value of the key that names the σ of `key`: `k_r_per_s_sigma` beside `k_r_per_s`."""
     if key == "value":
         return content.get("sigma", math.nan)
     for other, value in content.items():

@@ -142,5 +142,5 @@ def test_a_decay_of_such_a_camera(
     (true,) = read_material("blue-paint").states
     assert len(fit.states) == 1
     assert "black-cut-off" in codes(fit.warnings)
-    assert fit.states[0].k_r_sigma_per_s < 0.03 * true.k_r_per_s
-    assert abs(fit.states[0].k_r_per_s - true.k_r_per_s) < 3 * fit.states[0].k_r_sigma_per_s
+    assert fit.states[0].k_r_per_s_sigma < 0.03 * true.k_r_per_s
+    assert abs(fit.states[0].k_r_per_s - true.k_r_per_s) < 3 * fit.states[0].k_r_per_s_sigma

@@ -87,10 +87,10 @@ def test_all_numbers_are_on_the_page(plain: Made) -> None:
     assert isinstance(fit, DecayFit)
     assert fit.n_states == 2
     for state in fit.states:
-        assert plus_minus(state.k_r_per_s, state.k_r_sigma_per_s) in page.text
+        assert plus_minus(state.k_r_per_s, state.k_r_per_s_sigma) in page.text
         assert plus_minus(state.amplitude, state.amplitude_sigma) in page.text
         lifetime_s = 1 / state.k_r_per_s
-        assert plus_minus(lifetime_s, state.k_r_sigma_per_s * lifetime_s**2) in page.text
+        assert plus_minus(lifetime_s, state.k_r_per_s_sigma * lifetime_s**2) in page.text
     for expected in (
         "blue-paint",
         report.about.run,

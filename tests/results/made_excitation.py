@@ -30,7 +30,7 @@ def excitation_result() -> ExcitationResult:
     through.values[0, 0, 0] = math.nan
     (state,) = material.states
     fit = fit_excitation([through, direct], [state.k_r_per_s], [1.0], RelativeSigmas(bench.flicker))
-    unknown = replace(fit.states[0], k_r_sigma_per_s=math.inf)
+    unknown = replace(fit.states[0], k_r_per_s_sigma=math.inf)
     fit = replace(fit, states=(unknown,))
     whole = Series(
         t_s=np.array([1.0, 5.0]), exposure_s=np.ones(2), values=np.ones((2, 3)),

@@ -99,7 +99,7 @@ def test_an_excitation_says_what_thickness_leaves_and_that_it_was_not_looked_at(
     result = excitation_result()
     patch, fit = result.patches["left"], result.patches["left"].fit
     k_e = fit.states[0].k_e_per_s
-    known = replace(fit.states[0], k_r_sigma_per_s=0.001, k_e_sigma_per_s=0.05 * k_e + 1e-6)
+    known = replace(fit.states[0], k_r_per_s_sigma=0.001, k_e_per_s_sigma=0.05 * k_e + 1e-6)
     fit = replace(fit, states=(known,))
     bare = replace(result, patches={"": replace(patch, fit=fit)}).budgets()
     assert any("thickness" in budget.not_included for budget in bare.values())

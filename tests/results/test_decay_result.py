@@ -69,7 +69,7 @@ def test_the_covariance_says_whose_it_is(fit: DecayFit) -> None:
         zip(content["covariance_parameters"], np.sqrt(np.diag(content["covariance"])), strict=True)
     )
     for number, state in enumerate(fit.states, start=1):
-        assert sigma[f"k_r_per_s {number}"] == pytest.approx(state.k_r_sigma_per_s)
+        assert sigma[f"k_r_per_s {number}"] == pytest.approx(state.k_r_per_s_sigma)
         assert sigma[f"amplitude {number}"] == pytest.approx(state.amplitude_sigma)
     assert sigma["offset"] == pytest.approx(fit.offset_sigma)
 

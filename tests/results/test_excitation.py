@@ -74,7 +74,7 @@ def test_of_a_kinetic_order_only_what_is_known_is_shown(
     fit = patch.fit
     (state,) = fit.states
     bent = replace(
-        state, k_r_sigma_per_s=0.001, kinetic_order=1.5, kinetic_order_sigma=0.01,
+        state, k_r_per_s_sigma=0.001, kinetic_order=1.5, kinetic_order_sigma=0.01,
         is_level_known=is_known,
     )  # fmt: skip
     covariance = np.diag([*np.diag(fit.covariance), 1e-4])

@@ -459,7 +459,7 @@ def state_warnings(
     slowest, fastest = rate_bounds_per_s
     lifetime_s = 1 / states[-1].k_r_per_s
     for number, state in enumerate(states, start=1):
-        if state.k_r_sigma_per_s == 0:
+        if state.k_r_per_s_sigma == 0:
             continue
         if state.k_r_per_s < NEAR_BOUND * slowest:
             warnings.append(
@@ -520,7 +520,7 @@ def state_warnings(
                     ),
                 )
             )
-    is_fixed = states[-1].k_r_sigma_per_s == 0
+    is_fixed = states[-1].k_r_per_s_sigma == 0
     if free_offset and not is_fixed and sigma[-1] > ILL_DETERMINED:
         warnings.append(
             Undetermined(

@@ -152,7 +152,7 @@ def fit_decay(
     >>> y, sigma = decay.values[:, G], decay.sigma[:, G]
     >>> fit = labrig.fit_decay(decay.t_s, y, sigma, exposure_s=decay.exposure_s, flicker=0.007)
     >>> for state in fit.states:
-    ...     print(f"k = {state.k_r_per_s:.4f} ± {state.k_r_sigma_per_s:.4f} 1/s")
+    ...     print(f"k = {state.k_r_per_s:.4f} ± {state.k_r_per_s_sigma:.4f} 1/s")
     k = 0.2046 ± 0.0030 1/s
     k = 0.0101 ± 0.0001 1/s
     """

@@ -168,7 +168,7 @@ def _unseen_state(
     """Return the fast state that at its limit would change a rate by the most σ."""
     limit = fast.limit
     changes = _relative_changes(fit, data, states, fast.further.effect * limit)
-    relative_sigma = np.array([state.k_r_sigma_per_s / state.k_r_per_s for state in states])
+    relative_sigma = np.array([state.k_r_per_s_sigma / state.k_r_per_s for state in states])
     held = relative_sigma == 0
     in_sigma = np.abs(changes[:, 0]) / np.where(held, np.inf, relative_sigma)[:, None]
     worst = int(np.argmax(in_sigma.max(axis=0)))

@@ -436,7 +436,7 @@ def _at_off(
         # The lamp of that charge has errors of its own, beside those of the rates.
         light = problem.by_light_at_off(number, charging, rates)[charge, site]
         by_light = per_level[..., None] * (light / (b * level ** (b - 1))[:, None])
-        r0_sigma, a_sigma, time_sigma_s = (
+        r0_sigma, a_sigma, time_s_sigma = (
             np.sqrt(np.diag(propagated_covariance(covariance, rows)))[falling]
             for rows in by @ stated + by_light
         )
@@ -450,7 +450,7 @@ def _at_off(
                 (a * r0**b)[falling],
                 a_sigma,
                 time_s[falling],
-                time_sigma_s,
+                time_s_sigma,
             )
         )
     return tuple(levels_at_charge)

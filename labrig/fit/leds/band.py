@@ -39,7 +39,7 @@ class LedBand:
         Light in the band, ∫ value dλ, and σ by the noise.
     peak_nm
         Wavelength of the strongest light in nm.
-    centroid_nm, centroid_sigma_nm
+    centroid_nm, centroid_nm_sigma
         Centroid of the band in nm, and σ by the noise.
     beside : ndarray, shape (n,)
         Reading without the band, 0 there.
@@ -52,7 +52,7 @@ class LedBand:
     sigma: float
     peak_nm: float
     centroid_nm: float
-    centroid_sigma_nm: float
+    centroid_nm_sigma: float
     beside: FloatArray
     wavelength_nm: FloatArray
     value_sigma: FloatArray
@@ -115,7 +115,7 @@ def led_band(
         sigma=float(np.linalg.norm(noise)),
         peak_nm=float(wavelength_nm[peak]),
         centroid_nm=centroid,
-        centroid_sigma_nm=float(np.linalg.norm(noise * (wavelength_nm[inside] - centroid)) / light),
+        centroid_nm_sigma=float(np.linalg.norm(noise * (wavelength_nm[inside] - centroid)) / light),
         beside=beside,
         wavelength_nm=wavelength_nm,
         value_sigma=sigma,

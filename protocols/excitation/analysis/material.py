@@ -43,7 +43,7 @@ def excited_material(
         states=tuple(
             State(
                 k_r_per_s=state.k_r_per_s,
-                k_r_per_s_sigma=_known(state.k_r_sigma_per_s),
+                k_r_per_s_sigma=_known(state.k_r_per_s_sigma),
                 kinetic_order=state.kinetic_order,
                 kinetic_order_sigma=_known(state.kinetic_order_sigma) or None,
                 amplitude=float(max(at_off.amplitude[number], 0.0)),
@@ -54,7 +54,7 @@ def excited_material(
                 **_decay_time(fit, number),
                 k_e_per_s=tuple(state.k_e_per_s.tolist()),
                 **_range(fit, number, state),
-                k_e_per_s_sigma=_all_known(state.k_e_sigma_per_s),
+                k_e_per_s_sigma=_all_known(state.k_e_per_s_sigma),
                 **_reradiation(fit, number, state, spectrum, bands),
             )
             for number, state in enumerate(fit.states)
@@ -71,7 +71,7 @@ def _decay_time(fit: FittedExcitation, number: int) -> dict[str, float | None]:
     at_off = fit.at_off[-1]
     return {
         "decay_time_s": float(at_off.decay_time_s[number]),
-        "decay_time_s_sigma": _known(at_off.decay_time_sigma_s[number]),
+        "decay_time_s_sigma": _known(at_off.decay_time_s_sigma[number]),
     }
 
 

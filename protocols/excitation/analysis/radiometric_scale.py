@@ -136,7 +136,7 @@ def radiometric_scale(
         irradiance.bands_nm,
     )
     factors = (_settings(context, card, iso, f_number), *relative)
-    lux, lux_sigma = irradiance.illuminance_lux, irradiance.illuminance_sigma_lux
+    lux, lux_sigma = irradiance.illuminance_lux, irradiance.illuminance_lux_sigma
     if lux is None:
         return RadiometricScale("relative", factors)
     return RadiometricScale(

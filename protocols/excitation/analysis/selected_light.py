@@ -146,9 +146,9 @@ def with_doubt(fit: FittedExcitation, even: FittedExcitation) -> FittedExcitatio
     states = tuple(
         replace(
             state,
-            k_r_sigma_per_s=float(sigma[index]),
+            k_r_per_s_sigma=float(sigma[index]),
             amplitude_sigma=float(sigma[number + index]),
-            k_e_sigma_per_s=k_e_sigma[index],
+            k_e_per_s_sigma=k_e_sigma[index],
         )
         for index, state in enumerate(fit.states)
     )
@@ -174,7 +174,7 @@ def _parameters(fit: FittedExcitation) -> FloatArray:
 def course_of(fit: FittedExcitation, file: IrradianceFile) -> ExcitationCourse:
     """Return the course of excitation within the bands, of the glow that all states add to."""
     amplitude = np.array([state.amplitude for state in fit.states])
-    sigma = np.array([state.k_e_sigma_per_s for state in fit.states])
+    sigma = np.array([state.k_e_per_s_sigma for state in fit.states])
     growth = amplitude @ fit.k_e()
     growth_sigma = np.sqrt(amplitude**2 @ np.nan_to_num(sigma, posinf=growth.max()) ** 2)
     return excitation_course(np.array(file.cells_nm), np.array(file.bands_nm), growth, growth_sigma)

@@ -80,7 +80,7 @@ def frames_after_switch(
     parts = [_place_light(place_series, len(switched)) for place_series in series.values()]
     light_s, sigma_s = (np.hstack([part[number] for part in parts]) for number in (0, 1))
     first = next(iter(series.values()))
-    steady_dn_per_s, dark_sigma_dn_per_s = (
+    steady_dn_per_s, dark_dn_per_s_sigma = (
         np.concatenate([part[number] for part in parts]) for number in (2, 3)
     )
     unclipped = np.isfinite(light_s).any(axis=1)
@@ -101,7 +101,7 @@ def frames_after_switch(
         light_s[unclipped],
         sigma_s[unclipped],
         steady_dn_per_s,
-        dark_sigma_dn_per_s,
+        dark_dn_per_s_sigma,
         pass_number=pass_number,
         steady_frames=np.array([np.count_nonzero(references == name) for name in passes]),
         clipped=int(np.count_nonzero(clips)),
@@ -122,7 +122,7 @@ def take_columns(frames: SwitchedFrames, columns: NDArray[np.intp]) -> SwitchedF
         light_s=frames.light_s[:, columns],
         light_sigma_s=frames.light_sigma_s[:, columns],
         steady_dn_per_s=frames.steady_dn_per_s[columns],
-        dark_sigma_dn_per_s=frames.dark_sigma_dn_per_s[columns],
+        dark_dn_per_s_sigma=frames.dark_dn_per_s_sigma[columns],
     )
 
 

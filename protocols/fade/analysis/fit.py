@@ -335,7 +335,7 @@ class _Problem:
     def _dark_errors(self) -> FloatArray:
         """Return the values' errors by that of the dark level, shape (n, S, S)."""
         frames = self._frames
-        dark = np.diag(frames.dark_sigma_dn_per_s / frames.steady_dn_per_s)
+        dark = np.diag(frames.dark_dn_per_s_sigma / frames.steady_dn_per_s)
         errors: FloatArray = frames.exposure_s[:, np.newaxis, np.newaxis] * dark
         return errors
 

@@ -171,7 +171,7 @@ def _with_spectrum(led: LedLightMeasured, seen: Spectrometry) -> LedLightMeasure
     return replace(
         led,
         spectrum=band.spectrum,
-        wavelength_sigma_nm=math.hypot(SPECTROMETER_NM, band.centroid_sigma_nm),
+        wavelength_sigma_nm=math.hypot(SPECTROMETER_NM, band.centroid_nm_sigma),
         is_nominal=False,
         light=band.light,
         light_sigma=sigma,

@@ -46,7 +46,7 @@ def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
     assert result.warnings == ()
     assert_read_back(result)
     constant = np.array(blank.constant_dn_per_s)
-    assert np.all(np.abs(constant) < 4 * np.array(blank.constant_sigma_dn_per_s))
+    assert np.all(np.abs(constant) < 4 * np.array(blank.constant_dn_per_s_sigma))
 
     cut, resumed = cut_off_and_resumed(run, "blank-2")
     assert list(cut.completed()) == ["dark", "blank-1"]
@@ -63,9 +63,9 @@ def test_a_leak_is_found_and_reported_and_a_decay_is_warned(tmp_path: Path) -> N
     result = process_run(leaking)
     blank = BLANK_KIND.read(leaking / "result" / "blank.yaml")
     green = blank.channels.index("G")
-    assert blank.ambient_dn_per_s[green] > 10 * blank.ambient_sigma_dn_per_s[green]
+    assert blank.ambient_dn_per_s[green] > 10 * blank.ambient_dn_per_s_sigma[green]
     # Dark frames hold it, too: nothing is left once they are subtracted.
-    assert abs(blank.constant_dn_per_s[green]) < 4 * blank.constant_sigma_dn_per_s[green]
+    assert abs(blank.constant_dn_per_s[green]) < 4 * blank.constant_dn_per_s_sigma[green]
     assert of_code(result.warnings, "stray-light").values["occasion"] == "all the time"
 
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "40 s",

@@ -53,9 +53,9 @@ def test_rates_and_levels_are_the_true_ones(run: Path) -> None:
     (patch,) = done.result.patches.values()
     (state,), (truth,) = patch.fit.states, read_material("blue-paint").states
     assert truth.k_e_per_s is not None
-    assert abs(state.k_r_per_s - truth.k_r_per_s) < 4 * state.k_r_sigma_per_s
+    assert abs(state.k_r_per_s - truth.k_r_per_s) < 4 * state.k_r_per_s_sigma
     # The room's lamp is four times as bright as the irradiance to which Table 1's rates belong.
-    rates, sigma = state.k_e_per_s / 4, state.k_e_sigma_per_s / 4
+    rates, sigma = state.k_e_per_s / 4, state.k_e_per_s_sigma / 4
     off = rates - np.array(truth.k_e_per_s)
     assert (np.abs(off) < np.maximum(4 * sigma, 1e-5)).all()
     assert rates[:3] == pytest.approx(truth.k_e_per_s[:3], rel=0.1)
@@ -148,8 +148,8 @@ def test_a_frame_that_was_changed_is_refused(run: Path) -> None:
 def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_reported(run: Path) -> None:
     blank = BlankFile(
         iso=400, f_number=4.0, channels=("G",), t_s=(0.5,), rate_dn_per_s=((0.0,),),
-        sigma_dn_per_s=((1.0,),), constant_dn_per_s=(0.0,), constant_sigma_dn_per_s=(1.0,),
-        ambient_dn_per_s=(0.0,), ambient_sigma_dn_per_s=(1.0,), first_clean_s=10.0,
+        sigma_dn_per_s=((1.0,),), constant_dn_per_s=(0.0,), constant_dn_per_s_sigma=(1.0,),
+        ambient_dn_per_s=(0.0,), ambient_dn_per_s_sigma=(1.0,), first_clean_s=10.0,
     )  # fmt: skip
     whole = charge_frames(read_run(run), Overrides(), 150.0)
     clean = charge_frames(read_run(run), Overrides(), 150.0, blank)

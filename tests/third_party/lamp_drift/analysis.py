@@ -26,7 +26,7 @@ def analyse(context: AnalysisContext) -> LampDriftResult:
     change_sigmas = None
     earlier = context.inputs[DRIFT_KIND]
     if earlier is not None:
-        sigma_per_s = np.hypot(drift.sigma, earlier.drift_sigma_per_s)
+        sigma_per_s = np.hypot(drift.sigma, earlier.drift_per_s_sigma)
         change_sigmas = float((drift.value - earlier.drift_per_s) / sigma_per_s)
     return LampDriftResult(
         drift=drift, time_s=time_s, level_dn_per_s=level_dn_per_s, change_sigmas=change_sigmas

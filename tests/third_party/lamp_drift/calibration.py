@@ -11,12 +11,12 @@ class DriftFile(FrozenModel):
 
     Attributes
     ----------
-    drift_per_s, drift_sigma_per_s
+    drift_per_s, drift_per_s_sigma
         Change of the lamp's light relative to its mean, per second, and its standard uncertainty.
     """
 
     drift_per_s: float
-    drift_sigma_per_s: float = Field(gt=0)
+    drift_per_s_sigma: float = Field(gt=0)
 
 
 #: A rig file names it by `optics: {lamp_drift: …}`;

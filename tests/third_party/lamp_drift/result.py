@@ -35,5 +35,5 @@ class LampDriftResult(RunResult):
 
     def write_files(self, folder: Path) -> None:
         """Write `drift.yaml` into the result's folder."""
-        file = DriftFile(drift_per_s=self.drift.value, drift_sigma_per_s=self.drift.sigma)
+        file = DriftFile(drift_per_s=self.drift.value, drift_per_s_sigma=self.drift.sigma)
         DRIFT_KIND.write(folder, file)

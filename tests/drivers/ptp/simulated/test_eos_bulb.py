@@ -151,5 +151,5 @@ def test_a_slow_decay_in_exposures_of_64_s(
     assert exposures_s == pytest.approx([64.0] * len(exposures_s), abs=0.01)
     fit = json.loads((ended.run_folder / "result" / "fit.json").read_text())
     (state,) = fit["states"]
-    assert state["k_r_sigma_per_s"] < 0.05 * k_r_per_s
-    assert abs(state["k_r_per_s"] - k_r_per_s) < 3 * state["k_r_sigma_per_s"]
+    assert state["k_r_per_s_sigma"] < 0.05 * k_r_per_s
+    assert abs(state["k_r_per_s"] - k_r_per_s) < 3 * state["k_r_per_s_sigma"]
