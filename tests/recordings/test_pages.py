@@ -5,17 +5,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from .runs import RUNS, SLOW, Recorded
+from .runs import RUNS, Recorded
 
 pytestmark = pytest.mark.drawn
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
-#: Runs whose figures take seconds to draw; those of the others show the same kinds of content.
-DRAWN_SLOWLY = {
-    "camera_curves", "colour_check", "fade", "irradiance", "led_brightness", "lvf_calibration",
-}  # fmt: skip
+#: Reports of every run of the tests; those of the others take a second to draw for each figure.
+AT_ONCE = {"blank", "decay", "patches"}
 PHONE = {"width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": True}
 #: Script that lists what a reader cannot read, and what nobody should have to.
 UNREADABLE = (Path(__file__).parent / "unreadable.js").read_text(encoding="utf-8")
@@ -35,7 +33,7 @@ def unreadable(chromium: "Chrome", page: Path) -> list[str]:
         pytest.param(
             run,
             id=run.name,
-            marks=[pytest.mark.campaign] * (run.name in {*SLOW, *DRAWN_SLOWLY}),
+            marks=() if run.name in AT_ONCE else pytest.mark.campaign,
         )
         for run in RUNS
     ],
