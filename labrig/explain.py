@@ -81,16 +81,16 @@ def explain(name: str) -> list[Explanation]:
     >>> [each.place for each in explain("every")][:1]
     ['protocol file, protocol: decay']
     """
-    known = list(_all())
+    entries = list(_all())
     wanted = name.strip().lower()
-    found = [each for each in known if each.name.lower() == wanted]
-    if not found:
-        names = sorted({each.name for each in known})
+    matches = [each for each in entries if each.name.lower() == wanted]
+    if not matches:
+        names = sorted({each.name for each in entries})
         raise UsageError(
             f"expected a key of a file, the code of a warning or a term, got '{name}'; "
             f"{did_you_mean(name, names)}"
         )
-    return found
+    return matches
 
 
 def _all() -> Iterator[Explanation]:

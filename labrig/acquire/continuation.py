@@ -1,4 +1,4 @@
-"""Where a run that was begun before goes on, and how fast its devices have been so far."""
+"""Continuation of a run that was begun before, and the pace of its devices so far."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

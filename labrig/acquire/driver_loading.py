@@ -1,6 +1,6 @@
 """Loading of registered drivers by name, and checks of what their settings claim."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from typing import Any
 
 from labrig.acquire.channels import Board
@@ -113,6 +113,13 @@ def require_own_ports(rig: RigFile, source: str) -> None:
     >>> require_own_ports(labrig.read_rig_file("runs/decay/rig.yaml"), "rig.yaml")
     """
     devices = {key: driver_and_settings(rig, key, source) for key in rig.devices}
+    refuse_shared_outlets(rig, devices, source)
+
+
+def refuse_shared_outlets(
+    rig: RigFile, devices: Mapping[str, tuple[Any, Any]], source: str
+) -> None:
+    """Refuse what `require_own_ports` refuses, of devices whose driver and settings are loaded."""
     at: dict[str, str] = {}
     occupied: dict[tuple[str, Hashable], str] = {}
     for key, entry in rig.devices.items():

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from labrig.acquire.actions import ManualStep
 from labrig.acquire.continuation import Continuation, Pace
-from labrig.acquire.driver_loading import driver_and_settings, require_own_ports
+from labrig.acquire.driver_loading import driver_and_settings, refuse_shared_outlets
 from labrig.acquire.protocol import ProtocolModel, require_inside
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
@@ -279,15 +279,15 @@ def planned_rig(rig: RigFile, source: str, keys: Collection[str] | None = None) 
     0.3
     """
     clock = VirtualClock()
-    devices: dict[str, Device] = {}
-    for key in rig.devices:
-        if keys is not None and key not in keys:
-            continue
-        _, settings = driver_and_settings(rig, key, source)
-        if stand_in := ROLES[key].planned:
-            devices[key] = stand_in(settings, clock)
+    asked = [key for key in rig.devices if keys is None or key in keys]
+    loaded = {key: driver_and_settings(rig, key, source) for key in asked}
     if keys is None:
-        require_own_ports(rig, source)
+        refuse_shared_outlets(rig, loaded, source)
+    devices: dict[str, Device] = {
+        key: stand_in(settings, clock)
+        for key, (_, settings) in loaded.items()
+        if (stand_in := ROLES[key].planned)
+    }
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
     return Rig(rig.name, clock, devices, warm_up_s)
 

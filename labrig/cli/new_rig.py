@@ -58,10 +58,10 @@ def new(
     room = None if simulated is None else _room(simulated)
     dialogue = Unattended(typer.echo) if yes else Terminal()
     given = _given(set_keys or [])
-    found = _found(room, dialogue)
+    connected = _connected(room, dialogue)
     bench_name = name or dialogue.ask("name of the bench", "my bench")
     rig = choose_devices(
-        NewRig(bench_name, simulated=room), found, given, without or [], dialogue, str(file)
+        NewRig(bench_name, simulated=room), connected, given, without or [], dialogue, str(file)
     )
     if not rig.devices:
         raise UsageError(
@@ -115,7 +115,7 @@ def _given(set_keys: list[str]) -> dict[str, dict[str, Any]]:
     return given
 
 
-def _found(room: dict[str, Any] | None, dialogue: "Dialogue") -> "list[Candidate]":
+def _connected(room: dict[str, Any] | None, dialogue: "Dialogue") -> "list[Candidate]":
     from labrig.foundation import plugins
     from labrig.setup import Host, candidates, discover, simulated_candidates
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from labrig.foundation.activity import counted
 from labrig.foundation.errors import UsageError
 from labrig.foundation.output_file import replaced
-from labrig.reduce import SeriesFrame, cell_means_dn, read_raw, small
+from labrig.reduce import SeriesFrame, cell_means_dn, read_raw, sensor_layout, small
 
 Picture = NDArray[np.float32]
 #: Size of a file from which ImageJ's format has no offsets.
@@ -68,8 +68,9 @@ def write_image_stack(
 
     if not frames:
         raise UsageError("expected frames of a decay, got none; go on with labrig resume")
-    raw = read_raw(frames[0].path)
-    first = _shown(cell_means_dn(raw), width)
+    names = sensor_layout(frames[0]).channels
+    pictures = _pictures(frames, darks, width)
+    first = next(pictures)
     rows, columns, channels = first.shape
     shape = (len(frames), channels, rows, columns)
     if 4 * int(np.prod(shape, dtype=np.int64)) > MAX_BYTES:
@@ -77,8 +78,7 @@ def write_image_stack(
             f"{path}: expected at most 4 GB, which ImageJ can open, got {len(frames)} pictures of "
             f"{columns} × {rows} pixels; choose a smaller '--width'"
         )
-    pictures = _pictures(frames, darks, width)
-    planes = chain.from_iterable(np.moveaxis(each, -1, 0) for each in pictures)
+    planes = chain.from_iterable(np.moveaxis(each, -1, 0) for each in chain([first], pictures))
     with replaced(path) as draft:
         tifffile.imwrite(
             draft,
@@ -92,7 +92,7 @@ def write_image_stack(
                 "Labels": [
                     f"{channel} t={frame.t_s:.4f} s exposure={frame.exposure_s:.6g} s"
                     for frame in frames
-                    for channel in raw.channels
+                    for channel in names
                 ],
                 "Info": "values in DN/s above black and dark; t is the begin after lamp off",
             },

@@ -1,4 +1,4 @@
-"""What long work is at, for whoever shows it: a terminal, or nobody."""
+"""Progress of long work, for a display at the terminal or for none."""
 
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager

@@ -158,19 +158,19 @@ def require_kind(path: Path, *expected: FileKind) -> None:
     Traceback (most recent call last):
     labrig.foundation.errors.UsageError: ...: this is a protocol; a rig file is expected ...
     """
-    found = kind_of(path)
-    if found is None or found in expected:
+    actual = kind_of(path)
+    if actual is None or actual in expected:
         return
     wanted = expected[0]
     raise UsageError(
-        f"{path}: this is {found.name}, {found.use}; {wanted.name} is expected"
-        f"{_whereabouts(path, found, wanted)}"
+        f"{path}: this is {actual.name}, {actual.use}; {wanted.name} is expected"
+        f"{_whereabouts(path, actual, wanted)}"
     )
 
 
-def _whereabouts(path: Path, found: FileKind, wanted: FileKind) -> str:
+def _whereabouts(path: Path, actual: FileKind, wanted: FileKind) -> str:
     """Return where what is wanted is, if a run folder was given or what lies in one; else empty."""
-    if found is RUN and wanted.in_run and (path / wanted.in_run).exists():
+    if actual is RUN and wanted.in_run and (path / wanted.in_run).exists():
         return f", see {path / wanted.in_run}"
     if wanted is RUN and (run := run_around(path)) is not None:
         return f", see {run}"

@@ -27,19 +27,19 @@ class MarkedError(Protocol):
 
     @property
     def context(self) -> str | None:
-        """What the parser was at."""
+        """Structure that the parser was reading."""
 
     @property
     def context_mark(self) -> Mark | None:
-        """Where that began."""
+        """Begin of that structure."""
 
     @property
     def problem(self) -> str | None:
-        """What it could not go on from."""
+        """Problem at which it stopped."""
 
     @property
     def problem_mark(self) -> Mark | None:
-        """Where it stopped."""
+        """Place of the problem."""
 
 
 @dataclass(frozen=True)

@@ -78,10 +78,10 @@ def candidates(discovery: Discovery) -> list[Candidate]:
     >>> candidates(Discovery((board,), ()))[0].keys["relay"]
     0
     """
-    found = (*discovery.ports, *discovery.cameras, *discovery.spectrometers)
+    connected = (*discovery.ports, *discovery.cameras, *discovery.spectrometers)
     return [
         Candidate(role, f"{device.name} at {device.address}", keys, device.hints)
-        for device in found
+        for device in connected
         if device.snippet
         for role, keys in parse_yaml(device.snippet, device.address).items()
     ]
@@ -268,9 +268,9 @@ def _texts(model: type[BaseModel]) -> dict[str, str]:
     whole |= {
         name: each.description for name, each in model.model_fields.items() if each.description
     }
-    known: Collection[str] = (*DeviceEntry.model_fields, *model.model_fields)
+    keys: Collection[str] = (*DeviceEntry.model_fields, *model.model_fields)
     first = {key: _FIRST.split(text)[0].removesuffix(".") for key, text in whole.items()}
-    return {key: text.replace("`", "") for key, text in first.items() if key in known}
+    return {key: text.replace("`", "") for key, text in first.items() if key in keys}
 
 
 def _one_line(key: str, value: Any) -> str:

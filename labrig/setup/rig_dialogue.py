@@ -28,7 +28,7 @@ class Dialogue(Protocol):
 
     @property
     def is_person(self) -> bool:
-        """Whether somebody answers, who can correct an answer."""
+        """True if a person answers, who can correct an answer."""
 
     def tell(self, text: str) -> None:
         """Show a text."""
@@ -83,7 +83,7 @@ class Unattended:
 
 def choose_devices(
     rig: NewRig,
-    found: Sequence[Candidate],
+    connected: Sequence[Candidate],
     given: Mapping[str, Mapping[str, Any]],
     left_out: Collection[str],
     dialogue: Dialogue,
@@ -95,7 +95,7 @@ def choose_devices(
     ----------
     rig
         Rig without devices.
-    found
+    connected
         Devices that are connected.
     given
         Keys that are given beforehand, by the devices' keys; they are not asked for.
@@ -120,8 +120,8 @@ def choose_devices(
     --------
     >>> from labrig.setup import NewRig, Unattended, choose_devices, simulated_candidates
     >>> room = {"devices": {"lamp": {"driver": "numato", "address": "COM3", "relay": 2}}}
-    >>> found = simulated_candidates(room)
-    >>> rig = choose_devices(NewRig("attic"), found, {}, ["camera"], Unattended(print), "rig.yaml")
+    >>> connected, nobody = simulated_candidates(room), Unattended(print)
+    >>> rig = choose_devices(NewRig("attic"), connected, {}, ["camera"], nobody, "rig.yaml")
     >>> rig.devices["lamp"]["relay"], rig.devices["lamp"]["warm_up"]
     (2, '15 min')
     """
@@ -132,7 +132,7 @@ def choose_devices(
     for role in ROLES:
         if role in left_out:
             continue
-        fitting = [each for each in found if each.role == role and each not in used]
+        fitting = [each for each in connected if each.role == role and each not in used]
         chosen = _chosen(role, fitting, given.get(role, {}), dialogue)
         if chosen is None:
             continue
@@ -142,7 +142,7 @@ def choose_devices(
         keys = {**chosen.keys, **given.get(role, {})}
         rig = rig.with_device(role, keys, chosen.name)
         rig = _with_keys(rig, role, given.get(role, {}), dialogue, source)
-    others = tuple(each for each in found if each not in used and each.role not in left_out)
+    others = tuple(each for each in connected if each not in used and each.role not in left_out)
     return replace(rig, others=others)
 
 
@@ -234,8 +234,8 @@ def set_up(rig: NewRig, dialogue: Dialogue, source: str) -> NewRig:
             part = devices.devices.get(role.key)
             if isinstance(part, ServoSwing) and isinstance(part.ends_at()[0], float):
                 ends[role.key] = _ends(role.key, part, bench, dialogue)
-    for key, found in ends.items():
-        rig = rig.with_device(key, {**rig.devices[key], **found})
+    for key, places in ends.items():
+        rig = rig.with_device(key, {**rig.devices[key], **places})
     return rig
 
 
@@ -253,7 +253,7 @@ def _ends(key: str, part: ServoSwing, bench: Bench, dialogue: Dialogue) -> dict[
     dialogue.tell(
         f"{key}: the keys + and - move it by 10 us, > and < by 100 us; Enter keeps the place."
     )
-    found: dict[str, str] = {}
+    places: dict[str, str] = {}
     for (name, _), pulse_s in zip(part.ends, part.ends_at(), strict=True):
         part.go(pulse_s)
         dialogue.tell(f"{key}, {name}: {_us(pulse_s)}")
@@ -262,10 +262,10 @@ def _ends(key: str, part: ServoSwing, bench: Bench, dialogue: Dialogue) -> dict[
             pulse_s = min(max(pulse_s + STEPS_S.get(pressed, 0.0), SHORTEST_S), LONGEST_S)
             part.go(pulse_s)
             dialogue.tell(f"{key}, {name}: {_us(pulse_s)}")
-        found[name] = _us(pulse_s)
-    if len(set(found.values())) == 1:
-        raise UsageError(f"{key}: expected two different places, got {found.popitem()[1]} twice")
-    return found | _travel(key, part, bench, dialogue)
+        places[name] = _us(pulse_s)
+    if len(set(places.values())) == 1:
+        raise UsageError(f"{key}: expected two different places, got {places.popitem()[1]} twice")
+    return places | _travel(key, part, bench, dialogue)
 
 
 def _travel(key: str, part: ServoSwing, bench: Bench, dialogue: Dialogue) -> dict[str, str]:

@@ -20,7 +20,7 @@ UNREADABLE = (Path(__file__).parent / "unreadable.js").read_text(encoding="utf-8
 
 
 def unreadable(chromium: "Chrome", page: Path) -> list[str]:
-    """What the script finds on a page that is shown on a telephone."""
+    """Faults that the script lists on a page that is shown on a telephone."""
     chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
     chromium.get(page.as_uri())
     found: list[str] = chromium.execute_script(UNREADABLE)

@@ -8,6 +8,7 @@ parameters is −β J⁺c, with J and c in full, along the signal, too.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import chdtrc
@@ -505,24 +506,24 @@ def _law_warning(fit: StatesFit, diagnostics: FitDiagnostics) -> ResultWarning:
     laws = diagnostics.other_laws
     law = next((law for law in laws if law.name == diagnostics.law), laws[0])
     gain = diagnostics.exponentials_bic - law.bic
+    values: dict[str, Any] = {
+        "law": LAW_LABELS[law.name],
+        "formula": law.formula,
+        "exponentials": _exponentials(fit.n_states),
+        "delta_bic": gain,
+    }
     if gain <= 0:
         return Misfit(
             "rates-descriptive",
             "{law} ({formula}) describes this decay beside {exponentials}: the rates are "
             "descriptive only, do not extrapolate them beyond the times recorded",
-            law=LAW_LABELS[law.name],
-            formula=law.formula,
-            exponentials=_exponentials(fit.n_states),
-            delta_bic=gain,
+            **values,
         )
     return Misfit(
         "rates-descriptive",
         "{law} ({formula}) describes this decay better than {exponentials} (ΔBIC {delta_bic:2r}): "
         "the rates are descriptive only, do not extrapolate them beyond the times recorded",
-        law=LAW_LABELS[law.name],
-        formula=law.formula,
-        exponentials=_exponentials(fit.n_states),
-        delta_bic=gain,
+        **values,
     )
 
 
