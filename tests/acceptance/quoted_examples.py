@@ -125,7 +125,7 @@ QUOTES = (
             _line("B  380.*", "optics show"),
             _lines("ISO 100", "ISO 200", "run camera_calibration"),
             _lines("flicker ", "aperture: ", "run camera_calibration"),
-            _line(r"vignetting: corners at .*? at f/4,", "run camera_calibration"),
+            _line(r"vignetting: corners, beyond the card, at .*? at f/4,", "run camera_calibration"),
         )
     ),
     Quote(
