@@ -9,6 +9,7 @@ import typer
 from labrig.cli.completion import complete_protocol
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.protocol import protocol_path
+from labrig.cli.screen import echo_table
 from labrig.foundation.named_files import beside, is_path
 
 if TYPE_CHECKING:
@@ -72,7 +73,6 @@ def list_(
     """What is in the queue, how far it is, and what was found."""
     from json import dumps
 
-    from labrig.foundation.number_format import aligned
     from labrig.queue import entries, queue_report, read_queue
 
     listed = entries(read_queue(queue), runs)
@@ -82,7 +82,7 @@ def list_(
         typer.echo(f"nothing in {queue}")
     else:
         table = queue_report(queue.stem, listed).sections[0].tables[0]
-        typer.echo("\n".join(aligned([table.head, *table.rows])))
+        echo_table(table.head, table.rows)
 
 
 @app.command("run")

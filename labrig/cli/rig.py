@@ -4,13 +4,15 @@ import logging
 import sys
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from labrig.cli import default_rig, new_rig, page
 from labrig.cli.default_rig import RigArgument, rig_path
 from labrig.cli.detachable_stream import DetachableStream
+from labrig.cli.screen import echo
+from labrig.cli.wording import counted
 from labrig.foundation.errors import DeviceError, ProtocolError
 
 if TYPE_CHECKING:
@@ -18,7 +20,12 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="The devices of a bench.")
 
-_STYLES = {"refuse": "bold red", "failed": "bold red", "warn": "yellow", "fine": "green"}
+_STYLES: dict[str, dict[str, Any]] = {
+    "refuse": {"fg": "red", "bold": True},
+    "failed": {"fg": "red", "bold": True},
+    "warn": {"fg": "yellow"},
+    "fine": {"fg": "green"},
+}
 
 
 @app.callback()
@@ -81,7 +88,7 @@ def check(
     if json:
         typer.echo(dumps(report.to_json()))
     else:
-        _print_table(report)
+        _print_report(report)
     _raise_failures(report, path)
 
 
@@ -112,20 +119,16 @@ def _print_discovery(discovery: "Discovery") -> None:
         roles.add(role)
 
 
-def _print_table(report: "RigReport") -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=report.rig, title_justify="left", show_header=False)
+def _print_report(report: "RigReport") -> None:
+    """Print the verdict, then each device with what was seen of it."""
+    troubles = len(report.failures) + len(report.refusals)
+    verdict = f"{counted(troubles, 'trouble')}, named last" if troubles else "all is fine"
+    echo(f"{report.rig}: {verdict}", bold=True)
     for device, assessment, what, value in report.rows():
         if device:
-            table.add_section()
-        table.add_row(
-            Text(device, style="bold"), Text(assessment, style=_STYLES.get(assessment, "")),
-            Text(what), Text(value),
-        )  # fmt: skip
-    Console().print(table)
+            echo(f"\n{device}", bold=True)
+        text = f"{what.removesuffix(':')}: {value}" if value else what
+        echo(f"  {assessment:6}  {text}", **_STYLES.get(assessment, {}))
 
 
 def _raise_failures(report: "RigReport", path: Path) -> None:
