@@ -99,9 +99,9 @@ def folded_units(plan: Plan) -> Iterator[str]:
 
     Lines are as long as the terminal is wide, 120 characters if there is none.
     """
-    width = max(get_terminal_size((WIDTH, 24)).columns, 2 * INDENT)
+    width = get_terminal_size((WIDTH, 24)).columns
     for line in _unit_lines(plan):
-        yield from laid_out(line, width, INDENT + 2)
+        yield from laid_out(line, width, min(INDENT + 2, width // 2))
 
 
 def _unit_lines(plan: Plan) -> Iterator[str]:

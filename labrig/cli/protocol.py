@@ -50,15 +50,17 @@ def list_protocols() -> None:
     for path in resources.names("protocols").values():
         model = read_protocol(path)
         shipped.add(model.protocol)
-        rows.append((path.stem, model.protocol, _summary(read_text(path))))
+        other = "" if path.stem == model.protocol else f" (protocol {model.protocol})"
+        rows.append((path.stem, _summary(read_text(path)) + other))
     for name in plugins.names(plugins.MEASUREMENTS):
         if name not in shipped:
             try:
                 described = plugins.measurement(name).load("protocol").__doc__ or ""
             except UsageError as error:
                 described = str(error)
-            rows.append(("–", name, described.strip().partition("\n")[0]))
-    echo_table(("file", "protocol", "measures"), rows)
+            first = described.strip().partition("\n")[0]
+            rows.append((name, f"{first} (of an installed package, without a file)"))
+    echo_table(("protocol", "measures"), rows)
 
 
 def _summary(text: str) -> str:

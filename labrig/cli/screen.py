@@ -21,7 +21,9 @@ MIN_WIDTH = 30
 #: Width that the last column of a table gets at least, before its rows are stacked.
 MIN_SENTENCE = 24
 #: Spaces within a quantity: between a number and its unit or power, about `±` and `×`.
-_WITHIN_QUANTITY = re.compile(r"(?<=[\d)±×≤≥<>=]) (?=\S{1,6}(?:[\s,;:.)]|$))|(?<=\S) (?=[±×])")
+_WITHIN_QUANTITY = re.compile(
+    r"(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹±×≤≥<>=]) (?=\S{1,6}(?:[\s,;:.)]|$))|(?<=\S) (?=[±×])"
+)
 #: Cells of a line, each with the spaces before it; cells are two spaces or more apart.
 _CELL = re.compile(r"(\s*)(\S+(?:\s\S+)*)")
 
@@ -58,14 +60,9 @@ def echo_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 def _continued(lines: Sequence[str], begins: int, width: int) -> list[str]:
     """Return lines of a table whose last column, which begins at a column, is folded below it."""
-    return [
-        part
-        for line in lines
-        for part in wrap(
-            line, width, subsequent_indent=" " * begins, break_long_words=False,
-            break_on_hyphens=False, drop_whitespace=False,
-        )
-    ]  # fmt: skip
+    margin = " " * begins
+    fold = partial(wrap, width=width, break_long_words=False, break_on_hyphens=False)
+    return [part for line in lines for part in fold(line, subsequent_indent=margin)]
 
 
 def _stacked(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
