@@ -6,6 +6,7 @@ from .colours import (
     css_colour as css_colour,
     into_gamut as into_gamut,
 )
+from .columns_figure import columns_pictures as columns_pictures
 from .curve_sketch import (
     describe_curves as describe_curves,
     describe_shipped_curves as describe_shipped_curves,
@@ -14,6 +15,7 @@ from .curve_sketch import (
 from .decay_figures import (
     exposure_middles_s as exposure_middles_s,
 )
+from .described import sections_of as sections_of
 from .design import (
     describe_design as describe_design,
     describe_energy as describe_energy,
@@ -59,6 +61,10 @@ from .mixture import (
     difference_lines as difference_lines,
 )
 from .mixture_page import mixture_report as mixture_report
+from .notebook_page import (
+    NotebookPage as NotebookPage,
+    notebook_html as notebook_html,
+)
 from .page import (
     Report as Report,
     section_page as section_page,
