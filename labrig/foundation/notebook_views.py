@@ -21,10 +21,13 @@ class CsvTable:
         Names of the columns, with their units.
     rows
         Cells of each row, as long as `head`; an empty text where there is no number.
+    comments
+        Lines above the table, each of which begins with `#`.
     """
 
     head: Sequence[str]
     rows: Iterable[Sequence[Any]]
+    comments: Sequence[str] = ()
 
 
 class NotebookViews:

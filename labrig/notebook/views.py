@@ -8,6 +8,8 @@ from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.notebook.described import Description, describe
 from labrig.report import (
+    WIDTH_PT,
+    Chart,
     NotebookPage,
     Picture,
     columns_pictures,
@@ -91,7 +93,9 @@ def plot(result: NotebookViews, name: str = "") -> "Figure":
     kind = type(result).__name__
     if not pictures:
         raise UsageError(f"{kind}: there is nothing to draw: it has single values only")
-    begin_alike = (each for each in pictures if each.startswith(name))
+    # One of many small ones is no figure to begin with.
+    whole = (each for each in pictures if name or not _is_small(pictures[each]))
+    begin_alike = (each for each in (*whole, *pictures) if each.startswith(name))
     chosen = name if name in pictures else next(begin_alike, None)
     if chosen is None:
         known = did_you_mean(name, list(pictures))
@@ -100,6 +104,10 @@ def plot(result: NotebookViews, name: str = "") -> "Figure":
         figure = pictures[chosen].figure()
     figure.patch.set(visible=True, facecolor="white")
     return figure
+
+
+def _is_small(picture: Picture) -> bool:
+    return isinstance(picture.drawing, Chart) and picture.drawing.width_pt < WIDTH_PT
 
 
 def _pictures(result: NotebookViews, described: Description) -> Iterator[tuple[str, Picture]]:

@@ -339,7 +339,7 @@ def refit(result: RunResult, options: Mapping[str, Any]) -> RunResult:
     >>> from labrig.process import refit
     >>> one = refit(labrig.read_result("runs/decay"), {"states": 1})
     >>> [f"{rate.value:.4f}" for rate in one.patches["sample"].fit.rates]
-    ['0.0228']
+    ['0.0183']
     """
     folder = _folder_of(result)
     made = read_model(folder / "result" / PROVENANCE, Provenance)

@@ -1,6 +1,7 @@
 from .charge import (
     charge_report as charge_report,
 )
+from .chart import Chart as Chart
 from .colours import (
     camera_to_xyz as camera_to_xyz,
     css_colour as css_colour,

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,8 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 HEIGHT_PT = 256.0
-#: Height of a row of single values, and the most of them.
-ROW_PT, MAX_ROWS = 18.0, 60
+#: Height of a row of single values, and the most of them; the fewest that have no σ.
+ROW_PT, MAX_ROWS, MIN_ROWS = 18.0, 60, 6
 #: Longest columns whose values are drawn as points with their σ.
 MAX_POINTS = 200
 COLOUR = OTHER_CHANNELS[0]
@@ -47,17 +46,20 @@ def columns_pictures(result: Any) -> Iterator[Picture]:
 
     Examples
     --------
-    >>> import labrig
+    >>> from labrig.fit import fit_trap_depth
     >>> from labrig.report import columns_pictures
-    >>> spectrum = labrig.read_material("blue-paint").spectrum
-    >>> [picture.name for picture in columns_pictures(spectrum)]
-    ['value']
+    >>> depth = fit_trap_depth([15, 21, 27], [0.030, 0.048, 0.074], [0.001, 0.001, 0.002])
+    >>> [picture.name for picture in columns_pictures(depth)]
+    ['rate_per_s']
     """
-    by_name = sorted(iter_quantities(result), key=lambda each: each.path[-1:])
-    groups = [list(group) for _, group in groupby(by_name, key=lambda each: each.path[-1:])]
-    alike = [group for group in groups if 1 < len(group) <= MAX_ROWS and group[0].path]
-    for group in sorted(alike, key=lambda group: group[0].sigma is None):
-        yield Picture(group[0].path[-1], partial(_rows_figure, group))
+    groups: dict[str, list[Quantity]] = {}
+    for quantity in iter_quantities(result):
+        if quantity.path:
+            groups.setdefault(quantity.path[-1], []).append(quantity)
+    for name, group in sorted(groups.items(), key=lambda item: item[1][0].sigma is None):
+        fewest = MIN_ROWS if group[0].sigma is None else 2
+        if fewest <= len(group) <= MAX_ROWS:
+            yield Picture(name, partial(_rows_figure, group))
     items = list(iter_values(result))
     units = Units(items)
     nodes: dict[Place, dict[str, NDArray[Any]]] = {}

@@ -83,10 +83,10 @@ def iter_quantities(result: Any) -> Iterator[Quantity]:
     >>> fit = labrig.read_result("runs/decay").patches["sample"].fit
     >>> for quantity in iter_quantities(fit.states):
     ...     print("/".join(quantity.path), f"{quantity.value:.2g} ± {quantity.sigma:.1g}")
-    1/k_r_per_s 0.2 1/s
-    1/amplitude 8e+03
-    2/k_r_per_s 0.01 1/s
-    2/amplitude 2.8e+03
+    1/k_r_per_s 0.2 ± 0.003
+    1/amplitude 8e+03 ± 1e+02
+    2/k_r_per_s 0.01 ± 0.0001
+    2/amplitude 2.8e+03 ± 2e+01
     """
     items = list(iter_values(result))
     units, values = Units(items), dict(items)

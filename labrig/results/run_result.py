@@ -220,7 +220,8 @@ def write_result(folder: Path, result: RunResult) -> None:
     write_text(folder / FILE, result.to_json())
     for name, table in result.csv_tables().items():
         *inner, file = name.split("/")
-        write_csv(reduce(make_folder_in, inner, folder) / file, table.head, table.rows)
+        path = reduce(make_folder_in, inner, folder) / file
+        write_csv(path, table.head, table.rows, table.comments)
     result.write_files(folder)
 
 
