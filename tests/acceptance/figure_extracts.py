@@ -481,3 +481,10 @@ def intervals(printed: str) -> str:
         f"{span(narrow)} % and {span(wide)} % in the intervals, {span(by_sigma)} % and "
         f"{span(by_two)} % within ± 1 σ and ± 1.96 σ"
     )
+
+
+def announced_end(printed: str) -> str:
+    """Return how late the end announced at resume was, and how often by less than 2 s."""
+    late = match(r"^all +\d+ +(\S+) to (\S+), (\d+) of (\d+)", printed)
+    low, high, near, n = late.groups()
+    return f"late by {low} to {high} s; by less than 2 s in {near} of {n}".replace("-", "−")
