@@ -485,6 +485,7 @@ def intervals(printed: str) -> str:
 
 def announced_end(printed: str) -> str:
     """Return how late the end announced at resume was, and how often by less than 2 s."""
-    late = match(r"^all +\d+ +(\S+) to (\S+), (\d+) of (\d+)", printed)
-    low, high, near, n = late.groups()
-    return f"late by {low} to {high} s; by less than 2 s in {near} of {n}".replace("-", "−")
+    row = r"^all +\d+ +([-+.\d]+) to ([-+.\d]+), (\d+) of (\d+)"
+    (low,), (high,), (near,), (n,) = columns(row, printed)
+    late = f"late by {low:+.1f} to {high:+.1f} s".replace("-", "−")
+    return f"{late}; by less than 2 s in {near:.0f} of {n:.0f}"
