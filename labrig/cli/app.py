@@ -8,7 +8,6 @@ import typer
 from typer.core import TyperGroup
 
 from labrig.cli import (
-    compare,
     design,
     fit,
     leds,
@@ -18,6 +17,7 @@ from labrig.cli import (
     protocol,
     queue,
     render,
+    reproduce,
     rig,
     run,
     runs,
@@ -193,7 +193,7 @@ app.add_typer(material.app, name="material", rich_help_panel=EVALUATE)
 
 REPRODUCE = "Reproduce and design"
 app.command("render", rich_help_panel=REPRODUCE)(render.render)
-app.command("compare", rich_help_panel=REPRODUCE)(compare.compare)
+app.command("reproduce", rich_help_panel=REPRODUCE)(reproduce.reproduce)
 app.command("design", rich_help_panel=REPRODUCE)(design.design)
 app.add_typer(leds.app, name="leds", rich_help_panel=REPRODUCE)
 

@@ -33,7 +33,7 @@ def rigs() -> None:
     """The devices of a bench."""
 
 
-@app.command("list")
+@app.command("devices")
 def list_devices(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:

@@ -23,7 +23,7 @@ EMPTY_LINE = "\r\x1b[2K"
 #: Commands that only compute: they ask nothing, show nothing of their own, and end.
 COMPUTING = frozenset(
     {
-        *("compare", "figures", "fit", "frame", "leds", "material", "optics", "plan", "process"),
+        *("figures", "fit", "frame", "leds", "material", "optics", "plan", "process", "reproduce"),
         *("protocol", "render", "runs", "schema", "seal", "verify"),
     }
 )

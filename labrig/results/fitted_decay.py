@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.number_format import aligned, rounded
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.material import exponential_means_and_slopes
@@ -200,7 +201,7 @@ def recommended_sampling(lifetime_s: float) -> str:
 
 
 @dataclass(frozen=True)
-class FittedDecay:
+class FittedDecay(NotebookViews):
     """Decay model Σ_i a_i e^(−k_i t), times a weight and plus an offset for each channel.
 
     Attributes

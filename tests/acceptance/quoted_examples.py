@@ -93,8 +93,8 @@ QUOTES = (
             _console("runs list"),
             _console(f"{_COMPARED}\n"),
             _console(f"{_COMPARED} --reference"),
-            _lines("patch +1 state", "paper, 11", "compare last\n"),
-            _lines("Measured: ", "k_e was not", "compare last --material"),
+            _lines("patch +1 state", "paper, 11", "reproduce last\n"),
+            _lines("Measured: ", "k_e was not", "reproduce last --material"),
             _lines("runs/", "  4 of 4", "runs show"),
             _lines("    states: ", "    1 ", "runs show"),
         )
@@ -125,7 +125,9 @@ QUOTES = (
             _line("B  380.*", "optics show"),
             _lines("ISO 100", "ISO 200", "run camera_calibration"),
             _lines("flicker ", "aperture: ", "run camera_calibration"),
-            _line(r"vignetting: corners, beyond the card, at .*? at f/4,", "run camera_calibration"),
+            _line(
+                r"vignetting: corners, beyond the card, at .*? at f/4,", "run camera_calibration"
+            ),
         )
     ),
     Quote(

@@ -1,4 +1,4 @@
-"""`labrig compare`: comparison of a run with predictions, another material and the paper."""
+"""`labrig reproduce`: a run beside predictions, another material and the paper."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 TABLE = "rendered.csv"
 
 
-def compare(
+def reproduce(
     run: Annotated[
         Path,
         typer.Argument(
@@ -68,14 +68,14 @@ def compare(
             help="With --rendered: factor from Λ to s/sr of a material whose file has no scale.",
         ),
     ] = None,
-    figures: Annotated[
+    out: Annotated[
         Path | None,
         typer.Option(help="Folder for the figures; default: comparison in the run folder."),
     ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, draw nothing.")] = False,
 ) -> None:
-    """Predicted against photographed glow, more states against one, a material beside another.
+    """Predicted beside photographed glow of a run, more states beside one, another material.
 
     With the paper's own numbers (Nalbach et al., fig. 8 and 9, section 4.4, Table 1). With
     --rendered also fluorescent samples under lamps, photographed by validate_illuminants.
@@ -105,7 +105,7 @@ def compare(
         return
     for line in warning_lines(warnings, "warning: "):
         typer.echo(line, err=True)
-    drawn = figures or folder / "comparison"
+    drawn = out or folder / "comparison"
     for section in (*pages, *(() if room is None else room.sections)):
         _print_section(section)
         _save_figures(section, drawn)
@@ -115,7 +115,7 @@ def compare(
     typer.echo(f"table: {drawn / TABLE}")
     if room.scene is not None:
         typer.echo(f"scene: {room.scene.write(drawn)}")
-    if figures is None:
+    if out is None:
         options = _options(material, white, camera, assume_albedo, assume_scale)
         _show_in_report(folder, room.sections, options)
 
@@ -205,7 +205,7 @@ def _show_in_report(folder: Path, pages: "tuple[Section, ...]", options: list[st
 
     if not pages:
         return
-    command = shlex.join(["labrig", "compare", folder.name, "--rendered", *options])
+    command = shlex.join(["labrig", "reproduce", folder.name, "--rendered", *options])
     made = replace(pages[0], text=(*pages[0].text, f"Made by: {command}"))
     report = folder / "result" / "report.html"
     if show_comparison(folder, (made, *pages[1:])):
