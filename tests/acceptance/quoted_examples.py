@@ -3,7 +3,7 @@
 import re
 
 from tests.acceptance.printed import Extract, columns, match, part, span
-from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
+from tests.acceptance.quote import EXPLANATION, HOW_TO, VALIDATION, Quote
 
 
 def _console(command: str) -> Extract:
@@ -125,7 +125,9 @@ QUOTES = (
             _line("B  380.*", "optics show"),
             _lines("ISO 100", "ISO 200", "run camera_calibration"),
             _lines("flicker ", "aperture: ", "run camera_calibration"),
-            _line(r"vignetting: corners, beyond the card, at .*? at f/4,", "run camera_calibration"),
+            _line(
+                r"vignetting: corners, beyond the card, at .*? at f/4,", "run camera_calibration"
+            ),
         )
     ),
     Quote(
@@ -151,8 +153,8 @@ QUOTES = (
             _line(r"yellow: \d dye.*", "process last"),
             _line("daylight: .*", "run validate_illuminants"),
             _line("angular fluorescence: .*", "run angular_fluorescence"),
-            _direct,
             _direct_sigma,
         )
     ),
+    Quote(f"{VALIDATION}/fluorescence.md", "manual_fluorescent", _direct),
 )
