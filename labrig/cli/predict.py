@@ -32,8 +32,8 @@ MeteredOption = Annotated[
     str | None,
     typer.Option(
         "--metered",
-        help="With --predict, if no run tells how bright the material is: what metering chooses "
-        "for the first frame, such as '0.5 s'.",
+        help="With --predict, if no run has the brightness of the material: the exposure that "
+        "metering chooses for the first frame, such as '0.5 s'.",
     ),
 ]
 
@@ -186,7 +186,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("σ ×", justify="right", no_wrap=True)
     if not predicted.resolves_all_states:
-        table.add_column("tells all", justify="right", no_wrap=True)
+        table.add_column("finds all", justify="right", no_wrap=True)
     table.add_column("lab time", justify="right", no_wrap=True)
     for remedy in prediction.remedies:
         if not remedy.helps:

@@ -69,7 +69,7 @@ def list_(
     runs: Runs = RUNS,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
-    """What is in the queue, how far it is, and what was found."""
+    """The runs of the queue, their progress and their results."""
     from json import dumps
 
     from labrig.foundation.number_format import aligned
@@ -101,7 +101,7 @@ def run(
         bool, typer.Option("--verbose", help="Print every command to a device and its answer.")
     ] = False,
 ) -> None:
-    """Measure what is waiting or was interrupted. The last line is the page of results."""
+    """Measure the runs that wait or were interrupted. The last line is the page of results."""
     from labrig.cli.progress import Terminal
     from labrig.queue import run_queue
 

@@ -90,7 +90,7 @@ def test_rates_of_no_thermal_release_have_a_warning(
 @pytest.mark.parametrize(
     ("celsius", "rate", "sigma", "told"),
     [
-        ([20.0], [0.1], [0.01], "rates at two temperatures"),
+        ([20.0], [0.1], [0.01], "at two temperatures"),
         ([20.0, 21.0], [0.1, 0.11], [0.01, 0.01], "differ by 2 K"),
         ([20.0, 30.0], [0.1, -0.1], [0.01, 0.01], "above 0, got -0.1"),
         ([20.0, 30.0], [0.1, 0.2], [0.01, 0.0], "above 0, got 0.2 ± 0"),
