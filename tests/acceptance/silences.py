@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from math import exp, log
 from pathlib import Path
@@ -67,8 +68,8 @@ COMMANDS = (
     *("design --constraints wish.yaml --out glow.yaml", "queue add decay --rig sim"),
     *("queue list", "queue run"),
     *("run calibration --rig sim-phosphor --yes", "run phosphor --rig sim-phosphor --yes"),
-    *("process last", "runs show last", "compare last", "compare last --rendered"),
-    *("figures last", "verify last"),
+    *("process last", "runs show last", "compare last", "figures last"),
+    *("compare last --rendered --assume-albedo 0.6", "verify last"),
     *("run led_brightness --rig sim-fluorescent --yes",),
     *("run led_fluorescence --rig sim-fluorescent --yes", "process last"),
     *("run validate_illuminants --rig sim-fluorescent --yes", "compare last --rendered"),
@@ -146,11 +147,11 @@ def timed(command: str, folder: Path) -> Timed:
     )  # fmt: skip
     os.close(theirs)
     silence_s, before, screen = 0.0, "", ""
-    waited_s = _waited_for_a_processor_s(process.pid)
+    waited_s = _waited_s(process.pid)
     while time.monotonic() - began_s < MAX_S:
         ready, _, _ = select.select([ours], [], [], 0.1)
         now_s = time.monotonic()
-        silent_s = now_s - last_s - (_waited_for_a_processor_s(process.pid) - waited_s)
+        silent_s = now_s - last_s - _longest_wait_s(process.pid, waited_s)
         if silent_s > silence_s:
             silence_s, before = silent_s, screen
         if not ready:
@@ -161,7 +162,7 @@ def timed(command: str, folder: Path) -> Timed:
             break
         if not printed:
             break
-        last_s, waited_s = now_s, _waited_for_a_processor_s(process.pid)
+        last_s, waited_s = now_s, _waited_s(process.pid)
         screen = _last_line(screen + printed.decode("utf-8", "replace"))
     else:
         process.terminate()
@@ -169,12 +170,19 @@ def timed(command: str, folder: Path) -> Timed:
     return Timed(process.wait(), time.monotonic() - began_s, silence_s, before)
 
 
-def _waited_for_a_processor_s(pid: int) -> float:
-    """Return how long the process could run and did not; 0 where the system does not say it."""
-    try:
-        return float(Path(f"/proc/{pid}/schedstat").read_text("utf-8").split()[1]) / 1e9
-    except (OSError, IndexError):
-        return 0.0
+def _waited_s(pid: int) -> dict[str, float]:
+    """Return how long each thread could run and did not; none where the system does not say it."""
+    waited_s = {}
+    for task in Path(f"/proc/{pid}/task").glob("*/schedstat"):
+        with suppress(OSError, IndexError):
+            waited_s[task.parent.name] = float(task.read_text("utf-8").split()[1]) / 1e9
+    return waited_s
+
+
+def _longest_wait_s(pid: int, before_s: dict[str, float]) -> float:
+    """Return how long one of the threads has waited for a processor since `before_s`."""
+    now_s = _waited_s(pid)
+    return max((now_s[task] - before_s.get(task, 0.0) for task in now_s), default=0.0)
 
 
 def _last_line(text: str) -> str:
