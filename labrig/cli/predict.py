@@ -34,8 +34,8 @@ MeteredOption = Annotated[
     str | None,
     typer.Option(
         "--metered",
-        help="With --predict, if no run tells how bright the material is: what metering chooses "
-        "for the first frame, such as '0.5 s'.",
+        help="With --predict, if no run has the brightness of the material: the exposure that "
+        "metering chooses for the first frame, such as '0.5 s'.",
     ),
 ]
 
@@ -178,7 +178,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "_Rows
     """Return head and rows of the changes that help; one that halves σ is marked."""
     predicted = prediction.patches[patch]
     count = len(predicted.rate_per_s)
-    resolves = [] if predicted.resolves_all_states else ["resolves all"]
+    resolves = [] if predicted.resolves_all_states else ["finds all"]
     sigmas = ["σ"] if count == 1 else [f"σ {i + 1}" for i in range(count)]
     head = ["change (* halves σ)", *sigmas, "σ ×", *resolves, "lab time"]
     rows = []

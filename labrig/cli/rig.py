@@ -39,7 +39,7 @@ def list_devices(
 ) -> None:
     """Serial ports, USB cameras and spectrometers on this PC, each with its line for a rig file.
 
-    Says, too, what else may hold a camera and how to make it let go. Nothing is switched or sent.
+    Names programs that may hold a camera, and how to end them. Nothing is switched or sent.
     """
     from dataclasses import asdict
     from json import dumps

@@ -3,7 +3,7 @@
 import re
 
 from tests.acceptance.printed import Extract, columns, match, part, span
-from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
+from tests.acceptance.quote import EXPLANATION, HOW_TO, VALIDATION, Quote
 
 
 def _console(command: str) -> Extract:
@@ -153,8 +153,8 @@ QUOTES = (
             _line(r"yellow: \d dye.*", "process last"),
             _line("daylight: .*", "run validate_illuminants"),
             _line("angular fluorescence: .*", "run angular_fluorescence"),
-            _direct,
             _direct_sigma,
         )
     ),
+    Quote(f"{VALIDATION}/fluorescence.md", "manual_fluorescent", _direct),
 )
