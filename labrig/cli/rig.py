@@ -2,6 +2,7 @@
 
 import logging
 import sys
+from collections import Counter
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,11 +22,12 @@ if TYPE_CHECKING:
 app = typer.Typer(help="The devices of a bench.")
 
 _STYLES: dict[str, dict[str, Any]] = {
-    "refuse": {"fg": "red", "bold": True},
-    "failed": {"fg": "red", "bold": True},
+    "refuse": {"fg": "red"},
+    "failed": {"fg": "red"},
     "warn": {"fg": "yellow"},
     "fine": {"fg": "green"},
 }
+_TROUBLES = {"failed": "failure", "refuse": "refused setting", "warn": "warning"}
 
 
 @app.callback()
@@ -120,15 +122,17 @@ def _print_discovery(discovery: "Discovery") -> None:
 
 
 def _print_report(report: "RigReport") -> None:
-    """Print the verdict, then each device with what was seen of it."""
-    troubles = len(report.failures) + len(report.refusals)
-    verdict = f"{counted(troubles, 'trouble')}, named last" if troubles else "all is fine"
-    echo(f"{report.rig}: {verdict}", bold=True)
-    for device, assessment, what, value in report.rows():
-        if device:
-            echo(f"\n{device}", bold=True)
+    """Print the verdict, then each device with its settings and measured times."""
+    rows = list(report.rows())
+    assessed = Counter(assessment for _, assessment, _, _ in rows)
+    troubles = [counted(assessed[kind], noun) for kind, noun in _TROUBLES.items() if assessed[kind]]
+    echo(f"{report.rig}: {', '.join(troubles) or 'all is fine'}", bold=True)
+    for device, assessment, what, value in rows:
         text = f"{what.removesuffix(':')}: {value}" if value else what
-        echo(f"  {assessment:6}  {text}", **_STYLES.get(assessment, {}))
+        if device:
+            echo(f"\n{device}: {text}", bold=True, **_STYLES.get(assessment, {}))
+        else:
+            echo(f"  {assessment:6}  {text}", **_STYLES.get(assessment, {}))
 
 
 def _raise_failures(report: "RigReport", path: Path) -> None:

@@ -116,9 +116,9 @@ QUOTES = (
     *(
         Quote(CAMERA, "manual_own_camera", text)
         for text in (
-            _lines("│ camera ", "│ +│ +│ the dark", "rig check ./my-rig.yaml"),
-            _lines("│ +│ +│ release asked", "│ +│ +│ the next", "rig check sim"),
-            _lines("│ +│ +│ for the rig file", "│.*│ frame_size.*(?:\n.*)?", "rig check sim"),
+            _lines("camera: ", "  refuse ", "rig check ./my-rig.yaml"),
+            _lines(" +release asked", " +exposure over", "rig check sim"),
+            _lines(" +for the rig file", " +for the rig file.*frame_size", "rig check sim"),
             _curves_of,
             _line("R  380.*", "optics show"),
             _line("G  380.*", "optics show"),
