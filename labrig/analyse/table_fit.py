@@ -429,7 +429,8 @@ def _refuse_rise(path: Path, series: Series) -> None:
         start, until_s = series.clock.text(t_s[peak]), _clock_s(series, t_s[peak])
         raise FitError(
             f"{path}: expected a signal that decays, got one that rises until {until_s:.12g} s; "
-            f"fit what follows with '--from {start}', and say with --origin when the light went off"
+            f"fit the later rows with '--from {start}', and state with --origin when the light "
+            "went off"
         )
 
 

@@ -78,7 +78,9 @@ def decay(
     ] = "auto",
     at: Annotated[
         list[str] | None,
-        typer.Option("--at", help="Time such as '10 min' at which to tell the signal. Repeatable."),
+        typer.Option(
+            "--at", help="Time such as '10 min' at which the signal is printed. Repeatable."
+        ),
     ] = None,
     offset: Annotated[
         str, typer.Option("--offset", help="'zero', 'free', or the σ of a constant background.")
@@ -146,7 +148,7 @@ def decay(
     if share is not None:
         _require_one_of("--share", share, ("rates",))
         if at:
-            raise UsageError("--at: not with --share; fit a table by itself to tell its signal")
+            raise UsageError("--at: not with --share; fit a table by itself to print its signal")
         if intervals:
             raise UsageError("--intervals: not with --share; fit a table by itself to have them")
         _fit_shared(tables, options, layout, out, json)
@@ -276,7 +278,8 @@ def charge(
     """States of general kinetic order that charge and decay as one series of readings does.
 
     The lamp is constant from --on to --off, and the sample was empty before. Without σ in the
-    table, the variance is proportional to the value, and told by the scatter of neighbours.
+    table, the variance is proportional to the value, and its size follows from the scatter of
+    neighbours.
     """
     from labrig.analyse import ChargeTableOptions, fit_charge_table
     from labrig.results import TableLayout
@@ -299,7 +302,7 @@ def charge(
     typer.echo(
         f"material: {reported.material}"
         if reported.material
-        else "no material file: this charge does not tell k_r and r(0) of its states apart; "
+        else "no material file: this charge does not separate k_r and r(0) of its states; "
         "fit.json has amplitude, τ and p after this charge"
     )
     typer.echo(f"report: {reported.report}")
@@ -387,7 +390,7 @@ def mixture(
         typer.Option(
             "--threshold",
             help="Least value per band that counts as re-radiation; without it, by the noise: one "
-            "in twenty of what is kept is noise.",
+            "in twenty of the numbers above it is noise.",
         ),
     ] = None,
     entry: Entry = None,

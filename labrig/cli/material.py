@@ -51,7 +51,7 @@ Corrected = Annotated[
     typer.Option(
         "--corrected",
         help="Without the offset of each column and without bandpass spill, as an instrument's "
-        "anti-Stokes side tells them.",
+        "anti-Stokes side shows them.",
     ),
 ]
 Lights = Annotated[

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labrig.cli.completion import complete_rig
+from labrig.foundation.activity import activity
 from labrig.foundation.errors import DeviceError, LabrigError, UsageError
 
 if TYPE_CHECKING:
@@ -76,7 +77,8 @@ def new(
     try:
         if not yes:
             rig = set_up(rig, dialogue, str(file))
-        rig, report = measure(rig, str(file))
+        with activity("measuring the devices"):
+            rig, report = measure(rig, str(file))
     except LabrigError as error:
         write_text(file, rig.text())  # what was answered is kept
         error.args = (f"{error}; {file} is written, without what could not be measured",)
@@ -137,9 +139,10 @@ def _tell_next(file: Path, made: "NewRig") -> None:
         typer.echo(line)
     rig = read_rig_file(file)
     try:
-        decay = read_protocol(resources.names(resources.PROTOCOLS)["decay"])
-        adapted, _ = decay.adapted_to(planned_rig(rig, str(file)), chosen=())
-        plan(adapted, rig, str(file))
+        with activity("planning a decay"):
+            decay = read_protocol(resources.names(resources.PROTOCOLS)["decay"])
+            adapted, _ = decay.adapted_to(planned_rig(rig, str(file)), chosen=())
+            plan(adapted, rig, str(file))
     except LabrigError as error:
         typer.echo(f"! a decay cannot run on it yet: {error}")
     else:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labrig.cli.completion import complete_run
+from labrig.cli.screen import echo, echo_table
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 
 if TYPE_CHECKING:
@@ -223,23 +224,14 @@ def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
 
 
 def _print_section(section: "Section") -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False)
-    console.print(f"\n[bold]{section.title}[/bold]")
+    echo(f"\n{section.title}", bold=True)
     for text in section.text:
-        console.print(text, style="dim")
-    for data in section.tables:
-        if data.title:
-            console.print(f"\n[bold]{data.title}[/bold]")
-        table = Table(box=None, pad_edge=False)
-        for number, heading in enumerate(data.head):
-            table.add_column(heading, justify="right" if number else "left", overflow="fold")
-        for row in data.rows:
-            table.add_row(*row)
-        console.print(table)
-        console.print(data.caption, style="dim")
+        echo(text, dim=True)
+    for table in section.tables:
+        if table.title:
+            echo(f"\n{table.title}", bold=True)
+        echo_table(table.head, table.rows)
+        echo(table.caption, dim=True)
 
 
 def _save_figures(section: "Section", folder: Path) -> None:

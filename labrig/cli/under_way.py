@@ -25,6 +25,7 @@ COMPUTING = frozenset(
     {
         *("figures", "fit", "frame", "leds", "material", "optics", "plan", "process", "reproduce"),
         *("protocol", "render", "runs", "schema", "seal", "verify"),
+        *("driver new", "queue add", "queue list"),
     }
 )
 _hidden = threading.Event()
@@ -47,7 +48,7 @@ def showing_work(arguments: Sequence[str]) -> Iterator[None]:
     if not sys.stderr.isatty():
         yield
         return
-    is_work = bool(arguments) and arguments[0] in COMPUTING
+    is_work = not COMPUTING.isdisjoint({*arguments[:1], " ".join(arguments[:2])})
     out, err = sys.stdout, sys.stderr
     line = _Line(err)
     sys.stdout = cast(TextIO, _Erasing(out, line))

@@ -90,7 +90,10 @@ def seal(
     from labrig.process import seal_run
     from labrig.seal import read_key
 
-    lab_key = read_key(key_file() if key is None else key)
+    path = key_file() if key is None else key
+    if not path.exists():
+        raise UsageError(f"{path}: there is no such key; make one: labrig key new NAME")
+    lab_key = read_key(path)
     for folder in [find_run(each, runs) for each in run]:
         made = seal_run(folder, lab_key, SystemClock().wall())
         typer.echo(

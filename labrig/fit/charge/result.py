@@ -172,7 +172,7 @@ class ChargeFit(NotebookViews):
             f"{_text(self.prompt)}, dark level {_text(self.dark)}"
         )
         if self.is_any_one_sided:
-            lines.append("<, >: at a bound of what is possible, limit of 95 % probability")
+            lines.append("<, >: at a bound of the possible values, limit of 95 % probability")
         lines += interval_lines(self.named_intervals)
         lines += aligned(self.model_rows())
         return "\n".join(lines)
