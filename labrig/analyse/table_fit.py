@@ -21,6 +21,7 @@ from labrig.analyse.table_checks import (
 from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError, UsageError
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.quantity import FRACTION, parse
 from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.results import (
@@ -112,7 +113,7 @@ class TableFitOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class FittedTable:
+class FittedTable(NotebookViews):
     """Fit of one region of a table.
 
     Attributes

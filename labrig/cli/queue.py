@@ -9,6 +9,7 @@ import typer
 from labrig.cli.completion import complete_protocol
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.protocol import protocol_path
+from labrig.cli.screen import echo_table
 from labrig.foundation.activity import activity
 from labrig.foundation.named_files import beside, is_path
 
@@ -73,7 +74,6 @@ def list_(
     """The runs of the queue, their progress and their results."""
     from json import dumps
 
-    from labrig.foundation.number_format import aligned
     from labrig.queue import entries, queue_report, read_queue
 
     listed = entries(read_queue(queue), runs)
@@ -83,7 +83,7 @@ def list_(
         typer.echo(f"nothing in {queue}")
     else:
         table = queue_report(queue.stem, listed).sections[0].tables[0]
-        typer.echo("\n".join(aligned([table.head, *table.rows])))
+        echo_table(table.head, table.rows)
 
 
 @app.command("run")

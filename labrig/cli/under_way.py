@@ -23,8 +23,8 @@ EMPTY_LINE = "\r\x1b[2K"
 #: Commands that only compute: they ask nothing, show nothing of their own, and end.
 COMPUTING = frozenset(
     {
-        *("compare", "explain", "figures", "fit", "frame", "leds", "material", "optics", "plan"),
-        *("process", "protocol", "render", "runs", "schema", "seal", "verify"),
+        *("figures", "fit", "frame", "leds", "material", "optics", "plan", "process", "reproduce"),
+        *("protocol", "render", "runs", "schema", "seal", "verify"),
         *("driver new", "queue add", "queue list"),
     }
 )

@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.material.file import Material, State
 
 
@@ -39,7 +40,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class MaterialComparison:
+class MaterialComparison(NotebookViews):
     """All quantities that at least one of two materials has.
 
     Attributes

@@ -1,14 +1,17 @@
 """Processing of a run of any protocol, from its folder to result, report and exports."""
 
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import (
     AnalysisContext,
     Inputs,
     Overrides,
+    analyse_part,
     check_options,
     clock_warnings,
     read_run_protocol,
@@ -27,7 +30,7 @@ from labrig.foundation.result_warning import (
     Unmeasured,
     warning_lines,
 )
-from labrig.foundation.yaml_file import write_yaml
+from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
@@ -52,7 +55,7 @@ from labrig.report import (
     write_figures_pdf,
     write_report,
 )
-from labrig.results import RunResult, read_result, write_result, write_summary
+from labrig.results import ChainResult, RunResult, read_result, write_result, write_summary
 
 _EARLIER = "result-"
 
@@ -262,21 +265,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])
     require_recorded_settings(run, overrides.bench(folder), overrides)
-    analyse = measurement(protocol.protocol, str(folder)).load("analysis")
-    inputs = Inputs.of(rig)
-    part = AnalysisContext(run, protocol, rig, overrides, inputs)
-    result: RunResult = analyse(part)
-    lvf = inputs.updated_by(result)[LVF_KIND]
-    camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
-    warnings = (
-        *result.warnings,
-        *clock_warnings(run),
-        *unknown_camera,
-        *temperature_warnings(run, protocol.rate_frames),
-        *_clock_step_warnings(run),
-        *_unfinished_warnings(run, protocol),
-    )
-    result = replace(result, warnings=warnings)
+    part, result, camera = _analysed(run, protocol, rig, overrides)
 
     about = describe_run(run, protocol, rig)
     result_folder = new_result(folder)
@@ -297,7 +286,125 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     page = folder / "result" / "report.html"
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
-    return Processed(result, page, rendered.lines, changes)
+    return Processed(result.of_run(folder), page, rendered.lines, changes)
+
+
+def _analysed(
+    run: RunRecord, protocol: ProtocolModel, rig: RigFile, overrides: Overrides
+) -> tuple[AnalysisContext, RunResult, CameraResponse | None]:
+    """Return what was analysed, the result with all its warnings, and the camera's curves."""
+    analyse = measurement(protocol.protocol, str(run.folder)).load("analysis")
+    inputs = Inputs.of(rig)
+    part = AnalysisContext(run, protocol, rig, overrides, inputs)
+    result: RunResult = analyse(part)
+    lvf = inputs.updated_by(result)[LVF_KIND]
+    camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
+    warnings = (
+        *result.warnings,
+        *clock_warnings(run),
+        *unknown_camera,
+        *temperature_warnings(run, protocol.rate_frames),
+        *_clock_step_warnings(run),
+        *_unfinished_warnings(run, protocol),
+    )
+    return part, replace(result, warnings=warnings), camera
+
+
+def refit(result: RunResult, options: Mapping[str, Any]) -> RunResult:
+    """Return the result of a run with other options of its measurement, and write nothing.
+
+    Parameters
+    ----------
+    result
+        Result by `read_result` or `process_run`, or that of a part of a chain.
+    options
+        The measurement's own options by name, such as `states` of a decay.
+
+    Returns
+    -------
+    RunResult
+        Result of the same frames, regions and calibrations.
+
+    Raises
+    ------
+    UsageError
+        The result belongs to no run folder, the measurement has no such option, or another labrig
+        is processing the run.
+    FitError
+        Nothing can be fitted.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.process import refit
+    >>> one = refit(labrig.read_result("runs/decay"), {"states": 1})
+    >>> [f"{rate.value:.4f}" for rate in one.patches["sample"].fit.rates]
+    ['0.0183']
+    """
+    folder = _folder_of(result)
+    made = read_model(folder / "result" / PROVENANCE, Provenance)
+    protocol = read_run_protocol(folder)
+    regions = made.regions if hasattr(protocol, "patches") else {}
+    overrides = Overrides(regions, frozenset(made.excluded), optics=made.optics, options=options)
+    check_options(options, protocol)
+    with RunLock(folder / LOCK, "processing this run"):
+        run = read_run(folder)
+        rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
+        if not result.run_part:
+            return _analysed(run, protocol, rig, overrides)[1].of_run(folder)
+        whole = read_result(folder)
+        assert isinstance(whole, ChainResult), "only a chain has parts"
+        chain = AnalysisContext(run, protocol, rig, overrides, Inputs.of(rig))
+        refitted = analyse_part(chain, result.run_part, whole.parts)
+    return refitted.of_run(folder, result.run_part)
+
+
+def _folder_of(result: RunResult) -> Path:
+    if result.run_folder is None:
+        raise UsageError(
+            f"expected the result of a run, got one of '{result.kind}' that belongs to no run "
+            "folder; read it with labrig.read_result"
+        )
+    return result.run_folder
+
+
+def rendered_result(result: RunResult) -> Rendered:
+    """Return the sections of a run's report, made of its result.
+
+    Parameters
+    ----------
+    result
+        Result by `read_result` or `process_run`, or that of a part of a chain.
+
+    Returns
+    -------
+    Rendered
+        Sections as in the report, whose figures are not yet drawn.
+
+    Raises
+    ------
+    UsageError
+        The result belongs to no run folder.
+    DataError
+        The run's folder was changed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.process import rendered_result
+    >>> sections = rendered_result(labrig.read_result("runs/decay")).sections
+    >>> [section.title for section in sections][:2]
+    ['Results', 'Sample']
+    """
+    folder = _folder_of(result)
+    run, protocol = read_run(folder), read_run_protocol(folder)
+    rig = with_shipped_camera(Overrides().bench(folder), run.camera_identity)
+    camera, _ = _camera_response(rig, None, Inputs.of(rig).updated_by(result)[LVF_KIND])
+    source = Source(run, protocol, rig, describe_run(run, protocol, rig), camera)
+    if not result.run_part:
+        return _render(result, source)
+    link = next(link for link in protocol.chain() if link.name == result.run_part)
+    return render(result, replace(source, run=run.part(link.name), protocol=link.protocol))
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:
@@ -334,12 +441,10 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     ('runs/decay/result/figures/figures.pdf', 8)
     """
     folder = Path(folder)
-    run, protocol, result = read_run(folder), read_run_protocol(folder), read_result(folder)
-    rig = Overrides().bench(folder)
-    source = Source(run, protocol, rig, describe_run(run, protocol, rig))
+    result, run = read_result(folder), read_run(folder)
     path = path or folder / "result" / "figures" / "figures.pdf"
-    title = f"{source.about.title}, {source.about.run}"
-    n_pages = write_figures_pdf(path, title, _render(result, source).sections)
+    title = f"{read_run_protocol(folder).sample.name}, {run.name}"
+    n_pages = write_figures_pdf(path, title, rendered_result(result).sections)
     if not n_pages:
         raise UsageError(f"{folder}: expected a report with figures, it has none")
     return path, n_pages

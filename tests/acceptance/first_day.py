@@ -91,7 +91,7 @@ MISTAKES = (
     rig_mistake(
         "a serial port that is not there",
         SIM_RIG.replace("sim://room/relays", "/dev/ttyUSB97"),
-        "rig list|ttyUSB97",
+        "rig devices|ttyUSB97",
         3,
     ),
     rig_mistake(

@@ -93,8 +93,8 @@ QUOTES = (
             _console("runs list"),
             _console(f"{_COMPARED}\n"),
             _console(f"{_COMPARED} --reference"),
-            _lines("patch +1 state", "paper, 11", "compare last\n"),
-            _lines("Measured: ", "k_e was not", "compare last --material"),
+            _lines("patch +1 state", "paper, 11", "reproduce last\n"),
+            _lines("Measured: ", "k_e was not", "reproduce last --material"),
             _lines("runs/", "  4 of 4", "runs show"),
             _lines("    states: ", "    1 ", "runs show"),
         )
@@ -116,9 +116,9 @@ QUOTES = (
     *(
         Quote(CAMERA, "manual_own_camera", text)
         for text in (
-            _lines("│ camera ", "│ +│ +│ the dark", "rig check ./my-rig.yaml"),
-            _lines("│ +│ +│ release asked", "│ +│ +│ the next", "rig check sim"),
-            _lines("│ +│ +│ for the rig file", "│.*│ frame_size.*(?:\n.*)?", "rig check sim"),
+            _lines("camera: ", "  refuse ", "rig check ./my-rig.yaml"),
+            _lines(" +release asked", " +exposure over", "rig check sim"),
+            _lines(" +for the rig file", " +for the rig file.*frame_size", "rig check sim"),
             _curves_of,
             _line("R  380.*", "optics show"),
             _line("G  380.*", "optics show"),

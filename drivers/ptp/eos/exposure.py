@@ -81,6 +81,7 @@ class EosExposure:
             isos=tuple(isos),
             f_numbers=tuple(sorted(f_numbers)),
             overhead_s=self._settings.frame_time,
+            change_s=self._settings.change_time,
             frame_bytes=frame_bytes(self._settings.frame_size, self._settings.frame_pixels),
             frame_pixels=self._settings.frame_pixels,
         )

@@ -73,6 +73,7 @@ class StandardExposure:
             isos=tuple(sorted(isos)),
             f_numbers=tuple(sorted(self._f_number_choices(self._aperture()))),
             overhead_s=self._settings.frame_time,
+            change_s=self._settings.change_time,
             frame_bytes=frame_bytes(self._settings.frame_size, self._settings.frame_pixels),
             frame_pixels=self._settings.frame_pixels,
         )
