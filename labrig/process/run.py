@@ -128,10 +128,10 @@ def restore_result(run: Path, name: str) -> tuple[str, ...]:
     Examples
     --------
     >>> from labrig.process import restore_result
-    >>> restore_result("runs/decay", "result-1")
+    >>> restore_result("runs/decay", "result-99")
     Traceback (most recent call last):
     labrig.foundation.errors.UsageError: runs/decay: expected the name of an earlier result, got
-    'result-1'; the run has none
+    'result-99'; ...
     """
     run = Path(run)
     names = sorted((path.name for path in _earlier_results(run)), key=lambda each: int(each[7:]))

@@ -45,7 +45,7 @@ keys:
 """
 
 COMMANDS = (
-    *("--help", "--version", "explain k_e", "explain iso", "schema rig", "schema protocol"),
+    *("--help", "--version", "explain k_e_per_s", "explain iso", "schema rig", "schema protocol"),
     *("protocol list", "protocol new decay", "driver new acme_relay", "rig devices"),
     *("rig new mine.yaml --simulated sim --yes", "rig check sim", "optics list"),
     *("optics show canon_eos_5d_mark_ii", "plan decay --rig sim"),
