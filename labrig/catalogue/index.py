@@ -14,7 +14,7 @@ from fnmatch import fnmatchcase
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 from labrig.catalogue.run_summary import STATUSES, RunSummary
@@ -27,10 +27,16 @@ from labrig.foundation.output_file import write_durably
 from labrig.record import require_plain_folder, time_made
 from labrig.results import SUMMARY
 
+if TYPE_CHECKING:
+    from labrig.results import Measured
+
 FILE = ".runs-index"
 PROTOCOL = "protocol.yaml"
 #: Files on which every run's summary depends; the fits in its result are added to them.
-FILES = (PROTOCOL, "made.txt", "journal.jsonl", "result", f"result/{SUMMARY}")
+FILES = (
+    *(PROTOCOL, "made.txt", "journal.jsonl"),
+    *("result", f"result/{SUMMARY}", "result/result.json"),
+)
 #: Modules whose code decides what a summary says.
 _MODULES = (
     "catalogue/index.py",
@@ -38,6 +44,7 @@ _MODULES = (
     "catalogue/summarising.py",
     "results/fitted_decay.py",
     "results/fitted_decay_file.py",
+    "results/headline_values.py",
     "results/measured.py",
     "results/summary.py",
 )
@@ -76,12 +83,9 @@ class _Entry:
                 "units": summary.units,
                 "frames": summary.frames,
                 "parameters": {
-                    place: {
-                        name: [each.value, each.sigma, each.unit]
-                        for name, each in parameters.items()
-                    }
-                    for place, parameters in summary.parameters.items()
+                    place: _plain(parameters) for place, parameters in summary.parameters.items()
                 },
+                "values": _plain(summary.values),
                 "headline": summary.headline,
             },
         )
@@ -100,8 +104,10 @@ class _Entry:
         began = content["began"]
         content["made"] = datetime.fromisoformat(content["made"])
         content["began"] = None if began is None else datetime.fromisoformat(began)
-        if content["parameters"]:
-            content["parameters"] = _measured(content["parameters"])
+        content["parameters"] = {
+            place: _measured(parameters) for place, parameters in content["parameters"].items()
+        }
+        content["values"] = _measured(content["values"])
         return RunSummary(folder=run, **content)
 
 
@@ -169,13 +175,16 @@ def _stamp(path: str) -> Stamp:
     return [status.st_mtime_ns, status.st_ino, status.st_size]
 
 
-def _measured(parameters: Mapping[str, Mapping[str, Sequence[Any]]]) -> dict[str, Any]:
-    from labrig.results import Measured
+def _plain(quantities: "Mapping[str, Measured]") -> dict[str, tuple[float, float, str]]:
+    return {name: (each.value, each.sigma, each.unit) for name, each in quantities.items()}
 
-    return {
-        place: {name: Measured(*each) for name, each in of_place.items()}
-        for place, of_place in parameters.items()
-    }
+
+def _measured(quantities: Mapping[str, Sequence[Any]]) -> "dict[str, Measured]":
+    if not quantities:
+        return {}
+    from labrig.results import Measured  # not for a list of runs without results
+
+    return {name: Measured(*each) for name, each in quantities.items()}
 
 
 def _read_index(runs: Path) -> dict[str, _Entry]:

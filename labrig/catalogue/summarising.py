@@ -7,7 +7,7 @@ from labrig.catalogue.run_summary import RunStatus, RunSummary, status_of, utc
 from labrig.foundation.errors import DataError, DiskError, LabrigError
 from labrig.foundation.yaml_file import read_yaml
 from labrig.record import read_run, time_made
-from labrig.results import fits_by_folder, read_fitted_decay, read_summary
+from labrig.results import fits_by_folder, headline_values, read_fitted_decay, read_summary
 
 
 def summarise(folder: Path) -> RunSummary:
@@ -39,7 +39,7 @@ def summarise(folder: Path) -> RunSummary:
     except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
         status: RunStatus = "damaged" if has_journal else "interrupted"
-        return RunSummary(folder, sample, protocol, made, None, status, 0, number, 0, {})
+        return RunSummary(folder, sample, protocol, made, None, status, 0, number, 0, {}, {})
     # The files beside it may have been edited since.
     sample = record.began_with("sample") or sample
     protocol = record.began_with("protocol") or protocol
@@ -63,6 +63,7 @@ def summarise(folder: Path) -> RunSummary:
         units=number,
         frames=sum(len(attempt.frames) for attempt in completed.values()),
         parameters=parameters,
+        values=headline_values(folder / "result"),
         headline=next(iter(read_summary(folder / "result")), ""),
     )
 

@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from labrig.acquire import ProtocolModel, RigFile
@@ -20,7 +21,7 @@ from labrig.bench_optics import camera_curves, with_shipped_camera
 from labrig.calibration import LVF_KIND, LvfFile, keep_calibration, kept_calibrations
 from labrig.export import write_nexus
 from labrig.foundation.errors import DiskError, FitError, UsageError
-from labrig.foundation.output_file import make_folder_in
+from labrig.foundation.output_file import make_folder_in, write_durably
 from labrig.foundation.plugins import measurement
 from labrig.foundation.result_warning import (
     ResultWarning,
@@ -35,6 +36,7 @@ from labrig.process.result_changes import changes
 from labrig.process.verification import require_as_sealed
 from labrig.record import (
     PC_CLOCK,
+    FrameRecord,
     RunLock,
     RunRecord,
     clock_stepped,
@@ -48,13 +50,16 @@ from labrig.report import (
     calibration_sections,
     lamp_sections,
     render,
+    sample_picture,
     temperature_sections,
     write_figures_pdf,
     write_report,
 )
-from labrig.results import RunResult, read_result, write_result, write_summary
+from labrig.results import SAMPLE_PICTURE, RunResult, read_result, write_result, write_summary
 
 _EARLIER = "result-"
+#: Exposure time in seconds below which a frame of a glow is mostly noise; for display only.
+BRIEF_S = 1 / 30
 
 
 def new_result(run: Path) -> Path:
@@ -285,6 +290,9 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     )
     write_result(result_folder, result)
     write_nexus(result_folder / "run.nxs", run, about, result)
+    shown = [sorted(run.frames(role), key=_dimness) for role in protocol.picture_frames]
+    if (picture := sample_picture([*chain.from_iterable(shown)], camera)) is not None:
+        write_durably(result_folder / SAMPLE_PICTURE, picture)
     rendered = _render(result, Source(run, protocol, rig, about, camera))
     warning_texts = warning_lines(result.warnings, "warning: ")
     write_summary(result_folder, [*rendered.lines, *warning_texts])
@@ -298,6 +306,11 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
     return Processed(result, page, rendered.lines, changes)
+
+
+def _dimness(frame: FrameRecord) -> tuple[bool, float]:
+    """Return a rank: metered frames are the shorter, the brighter it is; brief ones are noisy."""
+    return frame.exposure_s < BRIEF_S, frame.exposure_s * frame.iso
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:

@@ -11,7 +11,7 @@ import pytest
 
 from labrig.catalogue import RunFilter, compare_runs, list_runs, summarise
 from labrig.cli.exit_codes import guarded
-from labrig.results import write_fitted_decay
+from labrig.results import SAMPLE_PICTURE, write_fitted_decay
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 from tests.results.made import decay_result
@@ -75,12 +75,18 @@ def test_the_wanted_runs_are_listed_oldest_first(
     assert found == [f"0{day}" for day in days]
 
 
-def test_a_person_reads_one_line_a_run(week: Path, labrig: Labrig) -> None:
+def test_a_person_reads_a_table_of_samples(week: Path, labrig: Labrig) -> None:
     said = labrig("runs", "list", "--runs", week).out
-    (paint,) = (line for line in said.splitlines() if "2026-01-03" in line)
-    assert "blue-paint" in paint
-    assert "processed" in paint
-    assert re.search(r"0\.03\d+\(\d+\)", paint)
+    lines = said.splitlines()
+    assert [line for line in lines if line[0] != " "] == ["blue-paint", "green-paint"]
+    first, second = lines[1:3]
+    assert "2026-01-02" in first
+    assert "2026-01-03" in second
+    assert "processed" in second
+    assert re.search(r"k_r 0\.03\d+ ± 0\.\d+ 1/s$", second)
+    assert "2026-01-05" in lines[-1]
+    (blue, *_) = list_runs(week, RunFilter(sample="blue-paint"))
+    assert (blue.folder / "result" / SAMPLE_PICTURE).read_bytes()[1:4] == b"PNG"
     assert labrig("runs", "--runs", week).out == said
     assert "interrupted, 0 of 2" in labrig("runs", "--status=interrupted", "--runs", week).out
 
