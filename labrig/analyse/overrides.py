@@ -7,11 +7,15 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
+from labrig.analyse.process_options import flag
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import with_absolute_paths
 from labrig.foundation.region import Region, parse_region
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.record import FileRecord
+
+#: Options each of whose values is another one: a patch, a frame, a key of the rig file.
+_REPEATABLE = {"--roi", "--exclude", "--optics"}
 
 
 def read_run_protocol(run: Path) -> ProtocolModel:
@@ -111,6 +115,30 @@ class Overrides:
             dict(options),
         )
 
+    def given(self) -> tuple[str, ...]:
+        """Return what was given as options of a command line, such as `--states 2`."""
+        regions = {
+            f"{name}=" if name else "": ",".join(f"{each:g}" for each in region)
+            for name, region in self.regions.items()
+        }
+        texts = [f"--roi {name}{region}" for name, region in regions.items()]
+        texts += [f"--exclude {name}" for name in sorted(self.excluded)]
+        texts += [] if self.camera is None else [f"--camera {self.camera}"]
+        texts += [f"--optics {key}={path}" for key, path in self.optics.items()]
+        for name, value in self.options.items():
+            if isinstance(value, list | tuple):
+                texts += [f"{flag(name)} {each}" for each in value]
+            elif value is not None and value is not False:
+                texts.append(flag(name) if value is True else f"{flag(name)} {value}")
+        return tuple(texts)
+
+    def not_kept(self, before: Sequence[str]) -> list[str]:
+        """Return the options among those given before that are neither given again nor replaced."""
+        now = self.given()
+        flags = {text.split()[0] for text in now} - _REPEATABLE
+        keys = set(map(_key, now))
+        return [text for text in before if text.split()[0] not in flags and _key(text) not in keys]
+
     def bench(self, run: Path) -> RigFile:
         """Return the rig of a run as it was, with the user's calibrations instead.
 
@@ -158,6 +186,12 @@ class Overrides:
         if unknown:
             there = f"; it has {frames[0].path.name} to {frames[-1].path.name}" if frames else ""
             raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}")
+
+
+def _key(option: str) -> str:
+    """Return the part of an option that names what it is about: its flag, a patch, a frame."""
+    key, is_named, _ = option.partition("=")
+    return "--roi" if key.startswith("--roi ") and not is_named else key
 
 
 def _parse_calibration(text: str) -> tuple[str, str]:

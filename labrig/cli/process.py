@@ -1,5 +1,6 @@
 """`labrig process`: from a recorded run to its result."""
 
+import shlex
 from functools import cache
 from inspect import Parameter, Signature
 from itertools import pairwise
@@ -145,9 +146,11 @@ def process(
 ) -> None:
     """Reduce, fit and report a run again, and say what changed.
 
-    Measurements have options of their own: 'labrig process RUN --help' shows those of a run. An
-    earlier result that differs is kept as result-1, result-2, … What was reduced from the frames
-    before is used again, unless a region or a calibration that it depends on is another one.
+    Each call starts from the settings of the run's protocol and rig: options of an earlier call are
+    not kept unless they are given again, and the command says which. Measurements have options of
+    their own: 'labrig process RUN --help' shows those of a run. An earlier result that differs is
+    kept as result-1, result-2, … What was reduced from the frames before is used again, unless a
+    region or a calibration that it depends on is another one.
     """
     from labrig.analyse import Overrides, verify_frames
     from labrig.catalogue import find_run
@@ -165,11 +168,21 @@ def process(
 
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
     """Process the run in the folder `run` and print its result."""
+    from labrig.analyse import Overrides
     from labrig.foundation.activity import activity
     from labrig.process import process_and_report
 
+    overrides = overrides or Overrides()
     with activity(f"processing {run.name}"):
         processed = process_and_report(run, overrides)
+    if processed.not_kept:
+        again = " ".join(map(_quoted, (*processed.not_kept, *overrides.given())))
+        typer.echo(
+            f"note: not kept from the result before: {', '.join(processed.not_kept)}; each "
+            "processing starts from the protocol; to keep them: labrig process "
+            f"{shlex.quote(str(run))} {again}",
+            err=True,
+        )
     if json:
         typer.echo(processed.result.to_json())
         return
@@ -180,3 +193,9 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
     for number, line in enumerate(processed.changes):
         typer.echo(f"  {line}" if number else line)
     typer.echo(f"report: {processed.report}")
+
+
+def _quoted(option: str) -> str:
+    """Return an option and its value as a shell takes them."""
+    name, blank, value = option.partition(" ")
+    return f"{name} {shlex.quote(value)}" if blank else name

@@ -3,13 +3,16 @@
 from collections import Counter
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Overrides, chosen_options, options_of
+from labrig.foundation.errors import UsageError
 from labrig.foundation.input_file import read_text
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.region import Region
+from labrig.foundation.yaml_file import read_model
 from labrig.record import (
     DeviceLine,
     RunDescription,
@@ -46,6 +49,9 @@ class Provenance(FrozenModel):
         Calibrations that the user named instead of the rig file's.
     journal
         Seal of the run's journal, the SHA-256 of its last line.
+    given
+        Options of `labrig process` that were given for this result, such as `--states 2`; those of
+        an earlier result are not kept.
     """
 
     labrig: str
@@ -57,6 +63,7 @@ class Provenance(FrozenModel):
     excluded: tuple[str, ...]
     optics: dict[str, str]
     journal: str
+    given: tuple[str, ...] = ()
 
 
 def provenance(
@@ -87,7 +94,16 @@ def provenance(
         excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),
         optics=dict(overrides.optics),
         journal=run.seal,
+        given=overrides.given(),
     )
+
+
+def given_before(run: Path) -> list[str]:
+    """Return the options that were given for the present result of a run; none without a result."""
+    try:
+        return list(read_model(run / "result" / PROVENANCE, Provenance).given)
+    except UsageError:
+        return []
 
 
 def _options(protocol: Any, overrides: Overrides) -> dict[str, Any]:

@@ -31,7 +31,13 @@ from labrig.foundation.result_warning import (
 from labrig.foundation.yaml_file import write_yaml
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
-from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
+from labrig.process.provenance import (
+    PROVENANCE,
+    Provenance,
+    describe_run,
+    given_before,
+    provenance,
+)
 from labrig.process.result_changes import changes
 from labrig.process.verification import require_as_sealed
 from labrig.record import (
@@ -172,12 +178,16 @@ class Processed:
         Most important numbers, in lines for the terminal.
     changes
         Differences from the result before; empty if there was none.
+    not_kept
+        Options that were given for the result before, and are not for this one, such as
+        `--states 2`: each processing starts from the protocol and the rig file.
     """
 
     result: RunResult
     report: Path
     lines: tuple[str, ...]
     changes: tuple[str, ...]
+    not_kept: tuple[str, ...] = ()
 
 
 def process_run(folder: Path | str, overrides: Overrides | None = None) -> RunResult:
@@ -299,13 +309,14 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     report = Report(about, result.warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
     include_comparison(folder, result_folder)
+    not_kept = tuple(overrides.not_kept(given_before(folder)))
     changes = put_in_place(result_folder)
     keep_calibration(folder, None if result.failures() else reference_of(part, result))
 
     page = folder / "result" / "report.html"
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
-    return Processed(result, page, rendered.lines, changes)
+    return Processed(result, page, rendered.lines, changes, not_kept)
 
 
 def _dimness(frame: FrameRecord) -> tuple[bool, float]:

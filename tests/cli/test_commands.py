@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from labrig.foundation import plugins
+from labrig.foundation.yaml_file import read_yaml
 from labrig.protocols.decay.result import DecayResult
 from labrig.record import RunLock, own_digest, read_run
 from labrig.results import read_result
@@ -501,6 +502,7 @@ def test_a_table_that_leaves_something_open_is_asked_for_an_option(
 def test_an_earlier_result_is_restored(labrig: Labrig, finished: Path) -> None:
     before = (finished / "result" / "result.json").read_bytes()
     assert labrig("process", finished, "--states", "2").code == 0
+    assert read_yaml(finished / "result" / "provenance.yaml")["given"] == ["--states 2"]
     after = (finished / "result" / "result.json").read_bytes()
     assert after != before
     (newest,) = sorted(finished.glob("result-*"), key=lambda each: int(each.name[7:]))[-1:]
@@ -515,3 +517,9 @@ def test_an_earlier_result_is_restored(labrig: Labrig, finished: Path) -> None:
     assert after in kept.values()
     assert newest.name not in kept
     one_line(labrig("runs", "restore", finished, "result-77"), 2, "expected the name of an earlier")
+    labrig("process", finished, "--states", "2")
+    again = labrig("process", finished, "--roi", "0.3,0.3,0.4,0.4").err
+    assert "not kept from the result before: --states 2; " in again
+    assert f"labrig process {finished} --states 2 --roi 0.3,0.3,0.4,0.4" in again
+    assert "--roi" in labrig("process", finished).err
+    assert "not kept" not in labrig("process", finished).err
