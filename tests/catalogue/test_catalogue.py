@@ -12,6 +12,8 @@ import pytest
 from labrig.catalogue import RunFilter, compare_runs, list_runs, summarise
 from labrig.cli.exit_codes import guarded
 from labrig.results import SAMPLE_PICTURE, write_fitted_decay
+from tests.analyse.recorded import processed_once
+from tests.analyse.small_runs import RECORD
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 from tests.results.made import decay_result
@@ -137,6 +139,23 @@ def test_the_same_paint_on_two_days_agrees_and_another_one_differs(
     assert "the rates agree" in labrig("runs", "compare", first, again).out
 
 
+def test_runs_that_cannot_be_compared_say_why(week: Path, tmp_path: Path, labrig: Labrig) -> None:
+    decay, *_, cut = (run.folder for run in list_runs(week, RunFilter()))
+    blank = RECORD["blank"](tmp_path)
+    waiting = labrig("runs", "compare", decay, blank)
+    assert (waiting.code, len(waiting.err.splitlines())) == (4, 1)
+    assert f"labrig process {blank}" in waiting.err
+    processed_once(blank)
+    for pair in ((decay, blank), (blank, decay), (blank, blank)):
+        refused = labrig("runs", "compare", *pair)
+        assert (refused.code, len(refused.err.splitlines())) == (2, 1)
+        assert "not comparable" in refused.err
+        assert ("both are runs of blank" in refused.err) == (pair == (blank, blank))
+    unfinished = labrig("runs", "compare", decay, cut)
+    assert (unfinished.code, len(unfinished.err.splitlines())) == (4, 1)
+    assert f"labrig resume {cut}" in unfinished.err
+
+
 @pytest.fixture
 def two_days(tmp_path: Path) -> tuple[Path, Path]:
     """A paint and two sources that stay: a phosphor and a steady one.
@@ -230,10 +249,7 @@ def test_results_are_shown_with_what_they_were_made_with(
     assert [float(rate[0]) for rate in rates] == pytest.approx([0.22, 0.22], rel=0.1)
 
 
-def test_what_cannot_be_compared_is_reported_in_a_line(week: Path, labrig: Labrig) -> None:
-    first, *_, cut = (run.folder for run in list_runs(week, RunFilter()))
-    ended = labrig("runs", "compare", first, cut)
-    assert (ended.code, len(ended.err.splitlines())) == (4, 1)
-    assert "labrig process" in ended.err
+def test_a_reference_that_is_no_patch_is_reported_in_a_line(week: Path, labrig: Labrig) -> None:
+    first, *_ = (run.folder for run in list_runs(week, RunFilter()))
     ended = labrig("runs", "compare", first, first, "--reference", "lamp")
     assert (ended.code, len(ended.err.splitlines())) == (2, 1)
