@@ -37,6 +37,7 @@ from labrig.acquire.rig_file import (
 )
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
 from labrig.acquire.roles.role import Finding, Severity
+from labrig.acquire.run_plan import read_run_protocol, read_run_rig
 from labrig.acquire.runner import RunObserver, run_units
 from labrig.acquire.running_programs import Program, linux_programs, running_programs
 from labrig.acquire.session import TOLERANCE_S, Session
@@ -111,6 +112,8 @@ __all__ = [
     "planned_rig",
     "read_protocol",
     "read_rig_file",
+    "read_run_protocol",
+    "read_run_rig",
     "require_own_ports",
     "run_units",
     "running_programs",

@@ -17,8 +17,8 @@ from .luminance_table import (
     evaluate_luminance_table as evaluate_luminance_table,
 )
 from .overrides import (
+    EDITED as EDITED,
     Overrides as Overrides,
-    read_run_protocol as read_run_protocol,
 )
 from .process_options import (
     ProcessOptions as ProcessOptions,

@@ -6,7 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
-from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
+from labrig.acquire import Optics, ProtocolModel, RigFile, read_run_protocol, read_run_rig
 from labrig.analyse.process_options import flag
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import with_absolute_paths
@@ -16,38 +16,8 @@ from labrig.record import FileRecord
 
 #: Options each of whose values is another one: a patch, a frame, a key of the rig file.
 _REPEATABLE = {"--roi", "--exclude", "--optics"}
-
-
-def read_run_protocol(run: Path) -> ProtocolModel:
-    """Read the protocol in a run folder.
-
-    Parameters
-    ----------
-    run
-        A run folder.
-
-    Returns
-    -------
-    ProtocolModel
-        The protocol as it was when the run was recorded.
-
-    Raises
-    ------
-    UsageError
-        The folder has no protocol.yaml, or it is malformed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.analyse import read_run_protocol
-    >>> protocol = read_run_protocol(Path("runs/decay"))
-    >>> protocol.protocol, protocol.sample.name, list(protocol.patches)
-    ('decay', 'sample', ['sample'])
-    """
-    path = run / "protocol.yaml"
-    if not path.is_file():
-        raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
-    return read_protocol(path)
+#: Option by which edits of a run's files are taken.
+EDITED = "--edited"
 
 
 @dataclass(frozen=True)
@@ -66,6 +36,8 @@ class Overrides:
         Keys of the rig file's `optics:` to replace: calibrations that were made later.
     options
         The measurement's own options by name, such as `states` of a decay.
+    edited
+        Whether protocol and rig are those of the files as they are now, instead of the journal's.
     """
 
     regions: Mapping[str, Region] = field(default_factory=dict)
@@ -73,6 +45,7 @@ class Overrides:
     camera: str | None = None
     optics: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
+    edited: bool = False
 
     @classmethod
     def parse(
@@ -130,7 +103,7 @@ class Overrides:
                 texts += [f"{flag(name)} {each}" for each in value]
             elif value is not None and value is not False:
                 texts.append(flag(name) if value is True else f"{flag(name)} {value}")
-        return tuple(texts)
+        return (*texts, EDITED) if self.edited else tuple(texts)
 
     def not_kept(self, before: Sequence[str]) -> list[str]:
         """Return the options among those given before that are neither given again nor replaced."""
@@ -138,6 +111,16 @@ class Overrides:
         flags = {text.split()[0] for text in now} - _REPEATABLE
         keys = set(map(_key, now))
         return [text for text in before if text.split()[0] not in flags and _key(text) not in keys]
+
+    def protocol(self, run: Path) -> ProtocolModel:
+        """Return the protocol of a run.
+
+        Raises
+        ------
+        UsageError
+            This is no run folder, or the protocol is malformed.
+        """
+        return read_run_protocol(run, edited=self.edited)
 
     def bench(self, run: Path) -> RigFile:
         """Return the rig of a run as it was, with the user's calibrations instead.
@@ -147,7 +130,7 @@ class Overrides:
         UsageError
             The rig file in the run folder is malformed.
         """
-        rig = read_rig_file(run / "rig.yaml")
+        rig = read_run_rig(run, edited=self.edited)
         return rig.model_copy(update={"optics": rig.optics.model_copy(update=dict(self.optics))})
 
     def patches(self, protocol: Any) -> dict[str, Region]:

@@ -85,7 +85,8 @@ def options_of(protocol: Any) -> list[type[ProcessOptions]]:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.analyse import options_of, read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
+    >>> from labrig.analyse import options_of
     >>> [options.__name__ for options in options_of(read_run_protocol(Path("runs/decay")))]
     ['DecayOptions']
     """
@@ -112,7 +113,8 @@ def check_options(given: Mapping[str, Any], protocol: Any) -> None:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.analyse import check_options, read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
+    >>> from labrig.analyse import check_options
     >>> decay = read_run_protocol(Path("runs/decay"))
     >>> check_options({"states": 2}, decay)
     >>> check_options({"order": 2}, decay)
@@ -153,7 +155,8 @@ def chosen_options(model: type[OptionsT], given: Mapping[str, Any]) -> OptionsT:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.analyse import chosen_options, options_of, read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
+    >>> from labrig.analyse import chosen_options, options_of
     >>> (options,) = options_of(read_run_protocol(Path("runs/decay")))
     >>> chosen_options(options, {"states": 2, "order": "free"}).states
     2

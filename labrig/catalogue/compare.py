@@ -13,8 +13,14 @@ from labrig.catalogue.comparable import not_comparable
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, DiskError, UsageError
 from labrig.foundation.result_warning import Disturbance, ResultWarning
-from labrig.foundation.yaml_file import did_you_mean, read_yaml
-from labrig.record import FrameRole, glow_temperature_c, read_run, relative_rate_change
+from labrig.foundation.yaml_file import did_you_mean
+from labrig.record import (
+    FrameRole,
+    glow_temperature_c,
+    plan_content,
+    read_run,
+    relative_rate_change,
+)
 from labrig.results import (
     EXPONENTIALS,
     LAW_LABELS,
@@ -247,7 +253,7 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     >>> [difference.quantity for difference in comparison.patches[0].differences]
     ['k_r 1', 'k_r 2', 'a 1', 'a 2']
     """
-    protocols = read_yaml(a / "protocol.yaml"), read_yaml(b / "protocol.yaml")
+    protocols = plan_content(a, "protocol.yaml"), plan_content(b, "protocol.yaml")
     results_a, results_b = (
         _results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True)
     )

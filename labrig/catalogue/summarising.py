@@ -2,11 +2,10 @@
 
 from pathlib import Path
 
-from labrig.acquire import read_protocol
+from labrig.acquire import read_run_protocol
 from labrig.catalogue.run_summary import RunStatus, RunSummary, status_of, utc
 from labrig.foundation.errors import DataError, DiskError, LabrigError
-from labrig.foundation.yaml_file import read_yaml
-from labrig.record import read_run, time_made
+from labrig.record import plan_content, read_run, time_made
 from labrig.results import fits_by_folder, headline_values, read_fitted_decay, read_summary
 
 
@@ -73,19 +72,18 @@ def _protocol_summary(folder: Path) -> tuple[str, str, tuple[str, ...] | None]:
 
     The names are None if the protocol is not installed.
     """
-    path = folder / "protocol.yaml"
     try:
-        protocol = read_protocol(path)
+        protocol = read_run_protocol(folder)
         units = tuple(unit.name for unit in protocol.units())
     except LabrigError:
-        return *_names_in(path), None
+        return *_names_in(folder), None
     return protocol.sample.name, protocol.protocol, units
 
 
-def _names_in(protocol: Path) -> tuple[str, str]:
-    """Return sample and protocol of a file that no installed protocol reads, `?` if it has none."""
+def _names_in(folder: Path) -> tuple[str, str]:
+    """Return sample and protocol of a run that no installed protocol reads, `?` if it has none."""
     try:
-        content = read_yaml(protocol)
+        content = plan_content(folder, "protocol.yaml")
     except LabrigError:
         return "?", "?"
     sample = content.get("sample")

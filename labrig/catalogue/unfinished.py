@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from labrig.catalogue.run_summary import RunSummary, utc
-from labrig.foundation.errors import DataError, DiskError, LabrigError
+from labrig.foundation.errors import DataError, DiskError
 from labrig.foundation.signals import name_of
 from labrig.record import JOURNAL, RunRecord, read_run
 
@@ -48,7 +48,6 @@ def _lines(summary: RunSummary) -> Iterator[str]:
     except (DataError, DiskError) as error:
         yield f"{error}; restore it from a copy"
         return
-    yield from _changed(summary, record)
     if summary.status == "damaged":
         yield f"its result cannot be read; make it anew with: labrig process {folder}"
         return
@@ -73,18 +72,3 @@ def _reason(reason: str) -> str:
     """Return the reason of a RunStop, a signal by its name."""
     number = reason.removeprefix("signal ")
     return f"by {name_of(int(number))}" if number != reason and number.isdecimal() else reason
-
-
-def _changed(summary: RunSummary, record: RunRecord) -> Iterator[str]:
-    """Yield what the run's protocol file says otherwise than its journal."""
-    from labrig.acquire import read_protocol
-
-    try:
-        protocol = read_protocol(summary.folder / "protocol.yaml")
-    except LabrigError as error:
-        yield f"{error}"
-        return
-    now = {"protocol": protocol.protocol, "sample": protocol.sample.name}
-    for key, value in now.items():
-        if (before := record.began_with(key)) not in ("", value):
-            yield f"protocol.yaml was changed: its {key} is '{value}', in the journal '{before}'"

@@ -1,6 +1,7 @@
 """`labrig process`: from a recorded run to its result."""
 
 import shlex
+from dataclasses import replace
 from functools import cache
 from inspect import Parameter, Signature
 from itertools import pairwise
@@ -11,6 +12,7 @@ import typer
 from typer.core import TyperCommand
 
 from labrig.cli.completion import complete_run
+from labrig.cli.wording import EDITED
 from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
@@ -46,7 +48,8 @@ class ProcessCommand(TyperCommand):
 
 def _options_of_run(words: tuple[str, ...]) -> "list[type[ProcessOptions]]":
     """Return the options of the first run that is named; none where none is."""
-    from labrig.analyse import options_of, read_run_protocol
+    from labrig.acquire import read_run_protocol
+    from labrig.analyse import options_of
     from labrig.catalogue import find_run
     from labrig.foundation.errors import LabrigError
 
@@ -142,6 +145,14 @@ def process(
             "looks untouched.",
         ),
     ] = False,
+    edited: Annotated[
+        bool,
+        typer.Option(
+            EDITED,
+            help="Take protocol.yaml and rig.yaml of the run folder as they were edited since, "
+            "instead of what the journal has of them.",
+        ),
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Reduce, fit and report a run again, and say what changed.
@@ -157,13 +168,24 @@ def process(
     from labrig.record import discard_cache, read_run
 
     options = context.meta.get(GIVEN, {})
-    overrides = Overrides.parse(roi or [], exclude or [], camera, optics or [], options)
+    overrides = replace(
+        Overrides.parse(roi or [], exclude or [], camera, optics or [], options), edited=edited
+    )
     folder = find_run(run, runs)
     if verify:
         discard_cache(folder)
         typer.echo(verify_frames(read_run(folder), overrides), err=True)
     process_and_print(folder, overrides, json=json)
     typer.echo(folder)
+
+
+def print_edits(run: Path, *, is_taken: bool) -> None:
+    """Print what was edited in a run's files since its journal has them, and what is used."""
+    from labrig.record import edited_keys
+
+    used = "the file's is used" if is_taken else f"the journal's is used; {EDITED} takes the file's"
+    for line in edited_keys(run):
+        typer.echo(f"note: {line}; {used}", err=True)
 
 
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
@@ -173,6 +195,7 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
     from labrig.process import process_and_report
 
     overrides = overrides or Overrides()
+    print_edits(run, is_taken=overrides.edited)
     with activity(f"processing {run.name}"):
         processed = process_and_report(run, overrides)
     if processed.not_kept:

@@ -119,12 +119,12 @@ def list_them(
 def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     """All there is to know of one run, its notes and earlier results included."""
     from labrig.catalogue import find_run, indexed_summary, unfinished
-    from labrig.record import read_notes
+    from labrig.record import edited_keys, read_notes
 
     folder = find_run(run, runs)
-    summary, notes = indexed_summary(folder), read_notes(folder)
+    summary, notes, edits = indexed_summary(folder), read_notes(folder), edited_keys(folder)
     if json:
-        about = {"notes": notes, "unfinished": unfinished(summary)}
+        about = {"notes": notes, "unfinished": unfinished(summary), "edited": edits}
         _print_json({**_summary_json(summary), **about})
         return
     typer.echo(f"{folder}")
@@ -134,6 +134,8 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     typer.echo(f"  {progress_text(summary)} {units}, {counted(summary.frames, 'frame')}")
     for line in unfinished(summary):
         typer.echo(f"  {printable(line)}")
+    for line in edits:
+        typer.echo(f"  {printable(line)}; the journal's counts")
     _print_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import read_run_rig
 from labrig.bench_optics import with_shipped_camera
 from labrig.compare.photographed_room import (
     DarkRoomScene,
@@ -91,7 +91,7 @@ class LampBench:
         self, folder: Path, result: PredictedUnderLamps, camera: CameraResponse, place: Path
     ) -> None:
         run = read_run(folder)
-        rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), run.camera_identity)
+        rig = with_shipped_camera(read_run_rig(folder), run.camera_identity)
         if rig.optics.grey_card is None:
             raise UsageError(f"rig '{rig.name}': expected 'grey_card' under 'optics:', got none")
         frames = run.frames(FrameRole.DARK)

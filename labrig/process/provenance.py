@@ -18,6 +18,7 @@ from labrig.record import (
     RunDescription,
     RunRecord,
     interruptions,
+    journal_text,
     read_notes,
     time_text,
 )
@@ -131,8 +132,19 @@ def library_versions() -> dict[str, str]:
     return {**installed, "opencv": cv2.__version__, "libraw": libraw}
 
 
-def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDescription:
-    """Collect the description of a run from its folder, its protocol and its rig."""
+def _text(run: RunRecord, name: str, *, edited: bool) -> str:
+    """Return the text of a run's file as its journal has it, or as it was edited since."""
+    text = None if edited else journal_text(run.folder, name)
+    return read_text(run.folder / name) if text is None else text
+
+
+def describe_run(
+    run: RunRecord, protocol: ProtocolModel, rig: RigFile, *, edited: bool = False
+) -> RunDescription:
+    """Collect the description of a run from its folder, its protocol and its rig.
+
+    `edited`: these are of the files as they were edited since.
+    """
     attempts = list(run.completed().values())
     start = attempts[0].start if attempts else run.attempts[0].start
     identities = start.get("devices", {})
@@ -153,8 +165,8 @@ def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDe
             for role, entry in rig.devices.items()
         ),
         guard=start.get("guard", ""),
-        protocol_text=read_text(run.folder / "protocol.yaml"),
-        rig_text=read_text(run.folder / "rig.yaml"),
+        protocol_text=_text(run, "protocol.yaml", edited=edited),
+        rig_text=_text(run, "rig.yaml", edited=edited),
         interruptions=interruptions(run),
         notes=read_notes(run.folder),
     )

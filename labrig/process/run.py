@@ -7,12 +7,12 @@ from pathlib import Path
 
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import (
+    EDITED,
     AnalysisContext,
     Inputs,
     Overrides,
     check_options,
     clock_warnings,
-    read_run_protocol,
     reference_of,
     require_recorded_settings,
     temperature_warnings,
@@ -263,7 +263,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     state  k / s⁻¹      1/k / s    amplitude / (DN/s)
     """
     folder, overrides = Path(folder), overrides or Overrides()
-    protocol = read_run_protocol(folder)
+    protocol = overrides.protocol(folder)
     with RunLock(folder / LOCK, "processing this run"):
         return _process(folder, overrides, protocol)
 
@@ -293,7 +293,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     )
     result = replace(result, warnings=warnings)
 
-    about = describe_run(run, protocol, rig)
+    about = describe_run(run, protocol, rig, edited=overrides.edited)
     result_folder = new_result(folder)
     write_provenance(
         result_folder, provenance(run, protocol, overrides, camera.name if camera else None)
@@ -358,9 +358,10 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     ('runs/decay/result/figures/figures.pdf', 8)
     """
     folder = Path(folder)
-    run, protocol, result = read_run(folder), read_run_protocol(folder), read_result(folder)
-    rig = Overrides().bench(folder)
-    source = Source(run, protocol, rig, describe_run(run, protocol, rig))
+    overrides = Overrides(edited=EDITED in given_before(folder))
+    run, protocol, result = read_run(folder), overrides.protocol(folder), read_result(folder)
+    rig = overrides.bench(folder)
+    source = Source(run, protocol, rig, describe_run(run, protocol, rig, edited=overrides.edited))
     path = path or folder / "result" / "figures" / "figures.pdf"
     title = f"{source.about.title}, {source.about.run}"
     n_pages = write_figures_pdf(path, title, _render(result, source).sections)

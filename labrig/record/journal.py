@@ -391,9 +391,9 @@ def check_start(doc: Mapping[str, Any]) -> None:
     texts = [doc[key] for key in _TEXTS if key in doc]
     if not isinstance(devices, dict):
         raise TypeError("'devices' is of another kind")
-    texts += [doc["uid"], doc["unit"], *devices.values()]
+    texts += [doc["uid"], doc["unit"], *devices.values(), *dict(doc.get("files", {})).values()]
     if not all(isinstance(text, str) for text in texts):
-        raise TypeError("'unit', 'devices' or another text is of another kind")
+        raise TypeError("'unit', 'devices', 'files' or another text is of another kind")
     if not all(isinstance(doc[key], bool) for key in doc if key.endswith(_READS_BACK)):
         raise TypeError("whether a light reads back is of another kind")
 

@@ -34,6 +34,7 @@ from labrig.foundation.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, Journal
 from labrig.record.plain_folder import require_plain_folder
+from labrig.record.plan_files import FILES, plan_texts
 from labrig.record.run_record import RunRecord, run_record
 
 MADE = "made.txt"
@@ -199,6 +200,7 @@ class RunFolder:
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)
         self._executor = ThreadPoolExecutor(1)
+        self._files_due = False
 
     @classmethod
     def create(
@@ -294,8 +296,11 @@ class RunFolder:
         wall
             Function that gives the time in seconds since 1970.
         metadata
-            Keys and values of the RunStart.
+            Keys and values of the RunStart; the first one has the run's files, too.
         """
+        if self._files_due or self._journal.size_bytes == 0:
+            self._files_due = False
+            metadata = {**metadata, FILES: plan_texts(self.path)}
         return AttemptWriter(
             self._journal,
             unit,
@@ -307,6 +312,10 @@ class RunFolder:
             self._disk,
             self._executor,
         )
+
+    def take_edits(self) -> None:
+        """Write the files as they are now into the next RunStart, from which they hold."""
+        self._files_due = True
 
     def close_open_attempts(
         self, wall: Callable[[], float], exit_status: str, reason: str
