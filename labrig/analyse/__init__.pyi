@@ -17,7 +17,6 @@ from .luminance_table import (
     evaluate_luminance_table as evaluate_luminance_table,
 )
 from .overrides import (
-    EDITED as EDITED,
     Overrides as Overrides,
 )
 from .process_options import (

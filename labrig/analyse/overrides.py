@@ -6,7 +6,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
-from labrig.acquire import Optics, ProtocolModel, RigFile, read_run_protocol, read_run_rig
+from labrig.acquire import EDITED, Optics, ProtocolModel, RigFile, read_run_protocol, read_run_rig
 from labrig.analyse.process_options import flag
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import with_absolute_paths
@@ -16,8 +16,6 @@ from labrig.record import FileRecord
 
 #: Options each of whose values is another one: a patch, a frame, a key of the rig file.
 _REPEATABLE = {"--roi", "--exclude", "--optics"}
-#: Option by which edits of a run's files are taken.
-EDITED = "--edited"
 
 
 @dataclass(frozen=True)
@@ -168,7 +166,10 @@ class Overrides:
         unknown = self.excluded.difference(*(_names(frame) for frame in frames))
         if unknown:
             there = f"; it has {frames[0].path.name} to {frames[-1].path.name}" if frames else ""
-            raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}")
+            raise UsageError(
+                f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}; give one by "
+                "its number or name, and repeat the option for several"
+            )
 
 
 def _key(option: str) -> str:
@@ -181,9 +182,11 @@ def _parse_calibration(text: str) -> tuple[str, str]:
     """Return key and absolute path of a calibration."""
     key, _, named = text.partition("=")
     if key not in Optics.model_fields or not named:
+        is_known = key in Optics.model_fields
+        hint = f"such as {key}=PATH" if is_known else did_you_mean(key, list(Optics.model_fields))
         raise UsageError(
             f"--optics: expected KEY=PATH with a key of 'optics:' in a rig file, got '{text}'; "
-            f"{did_you_mean(key, list(Optics.model_fields))}"
+            f"{hint}"
         )
     return key, with_absolute_paths({key: named}, Optics, Path.cwd())[key]
 

@@ -1,5 +1,6 @@
 """Options of `labrig process` that belong to measurements, as models that each registers."""
 
+import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -162,4 +163,8 @@ def chosen_options(model: type[OptionsT], given: Mapping[str, Any]) -> OptionsT:
     2
     """
     own = {flag(name): value for name, value in given.items() if name in model.model_fields}
-    return validate(own, model, "options")
+    try:
+        return validate(own, model, "options")
+    except UsageError as error:
+        # On a command line the values of an option that is repeated have no numbers.
+        raise UsageError(re.sub(r"^options: (--[\w-]+)(\.\d+)?", r"\1", str(error))) from None

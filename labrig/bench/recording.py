@@ -30,7 +30,15 @@ from labrig.foundation import resources
 from labrig.foundation.errors import DiskError, MissingDeviceError, ProtocolError, UsageError
 from labrig.foundation.plugins import bench_check
 from labrig.foundation.yaml_file import yaml_text
-from labrig.record import CALIBRATIONS_FILE, JOURNAL, RunFolder, RunSize, read_run, size_text
+from labrig.record import (
+    CALIBRATIONS_FILE,
+    JOURNAL,
+    RunFolder,
+    RunSize,
+    lost_files,
+    read_run,
+    size_text,
+)
 
 #: Consequence of the lack of a curve, by its key under `optics:`.
 _CURVES = {
@@ -269,7 +277,7 @@ def _confirm_losses(folder: RunFolder, confirm: Callable[[str], bool]) -> None:
     UsageError
         Nobody confirmed it.
     """
-    if not (lost := folder.lost_files()):
+    if not (lost := lost_files(folder.path, folder.read().attempts)):
         return
     done = list(folder.read().completed())
     kept = (

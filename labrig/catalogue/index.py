@@ -342,11 +342,18 @@ def _find_folder(run: Path, runs: Path) -> Path:
         require_kind(run, RUN)
     if not matches and run.exists() and (around := run_around(run)) is not None:
         raise UsageError(f"{run}: this is a part of a run; the run is {around}")
-    problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
+    problem = f"{len(matches)} runs begin so" if matches else _no_such_run(str(run), runs)
     raise UsageError(
-        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "
+        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}; see: "
         f"labrig runs --runs {runs}"
     )
+
+
+def _no_such_run(name: str, runs: Path) -> str:
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, [path.name for path in _run_folders(runs, "")], 1)
+    return f"there is no such run, did you mean '{near[0]}'?" if near else "there is no such run"
 
 
 def _run_folders(runs: Path, beginning: str) -> Iterator[Path]:

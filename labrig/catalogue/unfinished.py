@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from labrig.catalogue.run_summary import RunSummary, utc
 from labrig.foundation.errors import DataError, DiskError
 from labrig.foundation.signals import name_of
-from labrig.record import JOURNAL, RunRecord, read_run
+from labrig.record import JOURNAL, RunRecord, lost_files, read_run
 
 CUT_OFF = "labrig was cut off: killed, or this PC lost power"
 
@@ -40,13 +40,21 @@ def _lines(summary: RunSummary) -> Iterator[str]:
     if summary.status == "recorded":
         yield f"all units are recorded; go on with: labrig process {folder}"
         return
-    if not (folder / JOURNAL).exists():
-        yield f"nothing was recorded; go on with: labrig resume {folder}"
-        return
+    has_journal = (folder / JOURNAL).exists()
     try:
-        record = read_run(folder)
+        record = read_run(folder) if has_journal else None
     except (DataError, DiskError) as error:
-        yield f"{error}; restore it from a copy"
+        yield str(error)
+        return
+    if lost := lost_files(folder, record.attempts if record else ()):
+        yield (
+            f"its journal {'was cut' if has_journal else 'is gone'}: {len(lost)} frames have no "
+            f"line in it, {lost[0]} to {lost[-1]}; restore it from a copy, or record them again: "
+            f"labrig resume {folder} --yes"
+        )
+        return
+    if record is None:
+        yield f"nothing was recorded; go on with: labrig resume {folder}"
         return
     if summary.status == "damaged":
         yield f"its result cannot be read; make it anew with: labrig process {folder}"

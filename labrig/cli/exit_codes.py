@@ -129,6 +129,8 @@ def _wrong_call(error: "TyperException") -> str:
         message = message.replace(problems[0]["msg"], reason)
     context = getattr(error, "ctx", None)
     command = "labrig" if context is None else context.command_path
+    # Some commands show all their options only for what is named.
+    command = getattr(getattr(context, "command", None), "helped_by", command)
     options = () if context is None else [each.opts for each in context.command.params]
     if "unexpected extra argument" in message and ["--rig"] in options:
         message += ": a rig is given by --rig"

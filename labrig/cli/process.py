@@ -25,6 +25,8 @@ GIVEN, _WORDS, _SHOWN = "labrig.options", "labrig.words", "labrig.shown"
 class ProcessCommand(TyperCommand):
     """Command that takes every measurement's options, and shows those of the run that is named."""
 
+    helped_by = "labrig process RUN"
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words of the line, which help needs to find the run."""
         ctx.meta[_WORDS] = tuple(args)

@@ -129,7 +129,7 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
         return
     typer.echo(f"{folder}")
     measured = measurement(summary.protocol, summary.sample)
-    typer.echo(f"  {measured}, {_when(summary)} UTC, {summary.status}")
+    typer.echo(f"  {measured}, {_when(summary)}, {summary.status}")
     units = "unit" if summary.units == 1 else "units"
     typer.echo(f"  {progress_text(summary)} {units}, {counted(summary.frames, 'frame')}")
     for line in unfinished(summary):
@@ -175,13 +175,19 @@ def stack(
 ) -> None:
     """The frames of a decay as one TIFF of linear values, for ImageJ or napari; times in a CSV."""
     from labrig.analyse import Overrides, intact_frames
-    from labrig.catalogue import find_run
+    from labrig.catalogue import find_run, indexed_summary
     from labrig.export import write_image_stack
     from labrig.foundation.output_file import write_text
-    from labrig.record import read_run
+    from labrig.record import FrameRole, read_run
 
     folder = find_run(run, runs)
-    frames = intact_frames(read_run(folder), Overrides())
+    record, summary = read_run(folder), indexed_summary(folder)
+    if not record.frames(FrameRole.DECAY) and summary.done == summary.units:
+        raise UsageError(
+            f"{folder}: expected a run with frames of a decay, got one of {summary.protocol}, "
+            "which takes none"
+        )
+    frames = intact_frames(record, Overrides())
     path = out or folder / "result" / "decay.tif"
     ordered = sorted(frames.decay, key=lambda frame: frame.t_s)
     times, channels, rows, columns = write_image_stack(path, ordered, frames.dark, width)
@@ -359,7 +365,7 @@ def _result_folders(folder: Path) -> list[str]:
 
 
 def _when(run: "RunSummary") -> str:
-    return "–" if run.began is None else f"{run.began:%Y-%m-%d %H:%M}"
+    return "not begun" if run.began is None else f"{run.began:%Y-%m-%d %H:%M} UTC"
 
 
 def _summary_json(run: "RunSummary") -> dict[str, object]:

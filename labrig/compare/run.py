@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from labrig.acquire import read_run_rig
+from labrig.acquire import read_result_rig
 from labrig.bench_optics import calibration, camera_curves, with_shipped_camera
 from labrig.calibration import LVF_KIND
 from labrig.compare.glow import GlowComparison, compare_glow, glow_of, in_colour, predicted_by
@@ -287,7 +287,7 @@ def measured_camera(
     folder: Path, replacement: str | None
 ) -> tuple[CameraResponse | None, list[ResultWarning]]:
     """Return the curves requested, else those of the processing; without any, a warning."""
-    rig = with_shipped_camera(read_run_rig(folder), read_run(folder).camera_identity)
+    rig = with_shipped_camera(read_result_rig(folder), read_run(folder).camera_identity)
     try:
         lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
         return camera_curves(rig, replacement, lvf), []

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-from labrig.acquire import ProtocolModel, RigFile
+from labrig.acquire import ProtocolModel, RigFile, result_takes_edits
 from labrig.analyse import (
-    EDITED,
     AnalysisContext,
     Inputs,
     Overrides,
@@ -24,6 +23,7 @@ from labrig.foundation.errors import DiskError, FitError, UsageError
 from labrig.foundation.output_file import make_folder_in, write_durably
 from labrig.foundation.plugins import measurement
 from labrig.foundation.result_warning import (
+    Contradiction,
     ResultWarning,
     Unmeasured,
     warning_lines,
@@ -46,6 +46,7 @@ from labrig.record import (
     RunLock,
     RunRecord,
     clock_stepped,
+    edited_keys,
     read_run,
     require_plain_folder,
 )
@@ -290,6 +291,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
         *temperature_warnings(run, protocol.rate_frames),
         *_clock_step_warnings(run),
         *_unfinished_warnings(run, protocol),
+        *_edited_warnings(folder, overrides),
     )
     result = replace(result, warnings=warnings)
 
@@ -358,7 +360,7 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     ('runs/decay/result/figures/figures.pdf', 8)
     """
     folder = Path(folder)
-    overrides = Overrides(edited=EDITED in given_before(folder))
+    overrides = Overrides(edited=result_takes_edits(folder))
     run, protocol, result = read_run(folder), overrides.protocol(folder), read_result(folder)
     rig = overrides.bench(folder)
     source = Source(run, protocol, rig, describe_run(run, protocol, rig, edited=overrides.edited))
@@ -399,6 +401,19 @@ def _unfinished_warnings(run: RunRecord, protocol: ProtocolModel) -> tuple[Resul
             units=len(units),
             first=missing[0],
             run=run.name,
+        ),
+    )
+
+
+def _edited_warnings(folder: Path, overrides: Overrides) -> tuple[ResultWarning, ...]:
+    """Return a warning of edits of the run's files that were taken instead of its journal."""
+    if not overrides.edited or not (edits := edited_keys(folder)):
+        return ()
+    return (
+        Contradiction(
+            "run-edited",
+            "processed by files that were edited since the run was recorded: {edits}",
+            edits="; ".join(edits),
         ),
     )
 

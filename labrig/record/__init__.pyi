@@ -60,6 +60,7 @@ from .run_folder import (
     RunFolder as RunFolder,
     RunLock as RunLock,
     RunSize as RunSize,
+    lost_files as lost_files,
     size_text as size_text,
     time_made as time_made,
 )

@@ -166,4 +166,7 @@ def _flat(content: Any, place: str) -> Iterator[tuple[str, Any]]:
 
 
 def _shown(values: Mapping[str, Any], key: str) -> str:
-    return json.dumps(values[key], ensure_ascii=False) if key in values else "not there"
+    if key not in values:
+        return "not there"
+    value = values[key]
+    return f"'{value}'" if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

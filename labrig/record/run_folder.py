@@ -7,7 +7,7 @@ import shutil
 import socket
 import sys
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, Journal
 from labrig.record.plain_folder import require_plain_folder
 from labrig.record.plan_files import FILES, plan_texts
-from labrig.record.run_record import RunRecord, run_record
+from labrig.record.run_record import Attempt, RunRecord, run_record
 
 MADE = "made.txt"
 
@@ -269,20 +269,7 @@ class RunFolder:
 
     def unknown_files(self) -> list[str]:
         """Return the names of files among the frames that have no journal line, left by a crash."""
-        recorded = {file.path.name for attempt in self.read().attempts for file in attempt.files}
-        return sorted(
-            path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
-        )
-
-    def lost_files(self) -> list[str]:
-        """Return the names of files after the last in the journal, whose lines were lost.
-
-        A crash leaves one at most, which it kept from its line; several had lines.
-        """
-        recorded = [file.path.name for attempt in self.read().attempts for file in attempt.files]
-        last = max(recorded, default="")
-        later = [name for name in self.unknown_files() if name > last and not name.endswith(PART)]
-        return later if len(later) > 1 else []
+        return _unknown_files(self.path, self.read().attempts)
 
     def attempt(
         self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]
@@ -422,6 +409,43 @@ def _slug(name: str) -> str:
     text = spelled(name, sys.getfilesystemencoding())
     slug = re.sub(r"[^\w.-]+", "-", text).strip("-.")
     return os.fsencode(slug)[:80].decode(sys.getfilesystemencoding(), "ignore") or "run"
+
+
+def _unknown_files(run: Path, attempts: Sequence[Attempt]) -> list[str]:
+    recorded = {file.path.name for attempt in attempts for file in attempt.files}
+    return sorted(path.name for path in (run / "frames").glob("*") if path.name not in recorded)
+
+
+def lost_files(run: Path, attempts: Sequence[Attempt]) -> list[str]:
+    """Return the names of files after the last in the journal, whose lines were lost.
+
+    A crash leaves one at most, which it kept from its line; several had lines.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+    attempts
+        Attempts of which the journal still has lines.
+
+    Returns
+    -------
+    list of str
+        Names of files in the folder of the frames; none if nothing was lost.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import lost_files
+    >>> run = labrig.read_run("runs/decay")
+    >>> lost_files(run.folder, run.attempts), len(lost_files(run.folder, run.attempts[:1]))
+    ([], 25)
+    """
+    last = max((file.path.name for attempt in attempts for file in attempt.files), default="")
+    later = [
+        name for name in _unknown_files(run, attempts) if name > last and not name.endswith(PART)
+    ]
+    return later if len(later) > 1 else []
 
 
 def _highest_frame(frames: Path) -> int:
