@@ -34,6 +34,11 @@ def plan_texts(run: Path) -> dict[str, str]:
     }
 
 
+def files_bytes(texts: Mapping[str, str]) -> int:
+    """Return the number of bytes that the texts take in the line of a RunStart."""
+    return len(f', "{FILES}": {json.dumps(texts, ensure_ascii=False)}'.encode())
+
+
 def journal_text(run: Path, name: str) -> str | None:
     """Return the text of one of the files as a run's journal has it.
 

@@ -34,7 +34,7 @@ from labrig.foundation.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, Journal
 from labrig.record.plain_folder import require_plain_folder
-from labrig.record.plan_files import FILES, plan_texts
+from labrig.record.plan_files import FILES, files_bytes, plan_texts
 from labrig.record.run_record import Attempt, RunRecord, run_record
 
 MADE = "made.txt"
@@ -201,6 +201,11 @@ class RunFolder:
         self._journal = Journal(path / JOURNAL, disk)
         self._executor = ThreadPoolExecutor(1)
         self._files_due = False
+        self._files_bytes = sum(
+            files_bytes(doc[FILES])
+            for _, doc in (self._journal.read().documents if seed is not None else [])
+            if FILES in doc
+        )
 
     @classmethod
     def create(
@@ -285,20 +290,23 @@ class RunFolder:
         metadata
             Keys and values of the RunStart; the first one has the run's files, too.
         """
+        texts = {}
         if self._files_due or self._journal.size_bytes == 0:
-            self._files_due = False
-            metadata = {**metadata, FILES: plan_texts(self.path)}
-        return AttemptWriter(
+            texts = {FILES: plan_texts(self.path)}
+        writer = AttemptWriter(
             self._journal,
             unit,
             self.path / "frames",
             self._next_frame_number,
             wall,
             self._new_uid,
-            metadata,
+            {**metadata, **texts},
             self._disk,
             self._executor,
         )
+        self._files_due = False
+        self._files_bytes += sum(map(files_bytes, texts.values()))
+        return writer
 
     def take_edits(self) -> None:
         """Write the files as they are now into the next RunStart, from which they hold."""
@@ -363,7 +371,8 @@ class RunFolder:
     def _new_uid(self) -> str:
         if self._seed is None:
             return str(uuid.uuid4())
-        place = self._journal.size_bytes
+        # Without the files, in which are paths of this PC: the same run has the same uids.
+        place = self._journal.size_bytes - self._files_bytes
         return str(uuid.uuid5(uuid.NAMESPACE_OID, f"labrig {self._seed} {place}"))
 
     def _next_frame_number(self) -> int:

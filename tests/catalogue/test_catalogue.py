@@ -107,7 +107,12 @@ def test_runs_are_called_by_the_beginning_of_their_name(week: Path, labrig: Labr
     assert "green-paint" in shown.out
     assert "report.html" in shown.out
     assert "0 of 2" in labrig("runs", "show", "last", "--runs", week).out
-    for name, said in (("2026", "4 runs begin so"), ("2027", "there is no such run")):
+    last = "2026-01-05T00-00-00_decay_blue-paint"
+    for name, said in (
+        ("2026", "4 runs begin so"),
+        ("2027", "there is no such run"),
+        (last.replace("blue", "bleu"), f"did you mean '{last}'?"),
+    ):
         refused = labrig("runs", "show", name, "--runs", week)
         assert (refused.code, len(refused.err.splitlines())) == (2, 1)
         assert said in refused.err
@@ -151,6 +156,9 @@ def test_runs_that_cannot_be_compared_say_why(week: Path, tmp_path: Path, labrig
         assert (refused.code, len(refused.err.splitlines())) == (2, 1)
         assert "not comparable" in refused.err
         assert ("both are runs of blank" in refused.err) == (pair == (blank, blank))
+    stacked = labrig("runs", "stack", blank)
+    assert (stacked.code, len(stacked.err.splitlines())) == (2, 1)
+    assert "got one of blank" in stacked.err
     unfinished = labrig("runs", "compare", decay, cut)
     assert (unfinished.code, len(unfinished.err.splitlines())) == (4, 1)
     assert f"labrig resume {cut}" in unfinished.err
