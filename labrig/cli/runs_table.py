@@ -193,7 +193,7 @@ def runs_csv(runs: Sequence["RunSummary"]) -> str:
     head = [*about, *(each for column in columns for each in _value_head(*column)), "result"]
     rows = []
     for run in runs:
-        row = [
+        row: list[str | float] = [
             *(run.folder.name, run.sample, run.protocol, run.status),
             "" if run.began is None else f"{run.began:%Y-%m-%dT%H:%M:%SZ}",
             *(run.done, "" if run.units is None else run.units, run.frames),

@@ -171,7 +171,7 @@ def sample_picture(frames: Sequence[FrameRecord], camera: CameraResponse | None)
         linear = into_gamut(_to_screen(view, view.rgb.astype(np.float64), matrix))
         level = max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
         shown = np.where(view.is_saturated[..., np.newaxis], 1.0, np.minimum(linear / level, 1.0))
-        return png(srgb_bytes(small(shown.astype(np.float32), SAMPLE_WIDTH)))
+        return png(srgb_bytes(small(shown.astype(np.float32), SAMPLE_WIDTH).astype(np.float64)))
     return None
 
 
