@@ -130,6 +130,8 @@ def _wrong_call(error: "TyperException") -> str:
         message = message.replace(problems[0]["msg"], reason)
     context = getattr(error, "ctx", None)
     command = "labrig" if context is None else context.command_path
+    # Some commands show all their options only for what is named.
+    command = getattr(getattr(context, "command", None), "helped_by", command)
     options = () if context is None else [each.opts for each in context.command.params]
     if "'%Y-%m-%d'" in message:
         message = re.sub("does not match the formats.*", "is no day such as 2026-11-21", message)
