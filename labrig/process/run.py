@@ -439,7 +439,8 @@ def rendered_result(result: RunResult) -> Rendered:
     source = Source(run, protocol, rig, about, camera)
     if not result.run_part:
         return _render(result, source)
-    link = next(link for link in protocol.chain() if link.name == result.run_part)
+    chain: Any = protocol
+    link = next(link for link in chain.chain() if link.name == result.run_part)
     return render(result, replace(source, run=run.part(link.name), protocol=link.protocol))
 
 
