@@ -38,11 +38,15 @@ numpydoc_show_class_members = False
 html_math_renderer = "mathml"
 html_static_path = ["static"]
 html_css_files = ["labrig.css"]
+html_logo = html_favicon = "static/logo.svg"
+# Pages without further pages below them have no navigation of a section.
+html_sidebars = {page: [] for page in ("tutorial", "glossary", "contributing")}
 html_theme = "pydata_sphinx_theme"
 html_title = "labrig"
 html_show_sourcelink = False
 html_theme_options = {
     "navigation_with_keys": False,
+    "logo": {"text": "labrig", "alt_text": "labrig"},
     "secondary_sidebar_items": ["page-toc"],
     "show_prev_next": True,
     "pygments_light_style": "default",

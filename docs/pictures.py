@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from filelock import FileLock
+from PIL import Image
 from selenium.webdriver import Chrome
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -56,6 +57,7 @@ def main() -> None:
         page(chrome, (decay / "result/report.html").as_uri(), "report_decay", 2000)
         page(chrome, (phosphor / "result/report.html").as_uri(), "report_phosphor", 1500)
         mixture(chrome, Path(scratch, "mixture"))
+        front(Path(scratch, "front"))
         half = half_done(decay, Path(scratch, "runs"))
         # A run whose folder is locked is under way.
         with FileLock(half / ".lock"), served("watch", str(half), "--no-browser") as address:
@@ -82,6 +84,18 @@ def mixture(chrome: Chrome, folder: Path) -> None:
     arguments = ("fit", "mixture", "paper.csv", "--corrected", "--out", ".")
     subprocess.run([*LABRIG, *arguments], cwd=folder, check=True)
     page(chrome, (folder / "report.html").as_uri(), "report_mixture", 1190)
+
+
+def front(folder: Path) -> None:
+    """Render the shipped room in the light and after it, side by side, for the front page."""
+    size = ("--size", "420x420", "--paths", "128")
+    subprocess.run([*LABRIG, "render", "cornell-box", *size, "--out", str(folder)], check=True)
+    panels = [Image.open(path) for path in sorted(folder.glob("[0-9]*.png"))]
+    width = sum(panel.width for panel in panels)
+    strip = Image.new("RGB", (width, max(panel.height for panel in panels)))
+    for number, panel in enumerate(panels):
+        strip.paste(panel, (number * panel.width, 0))
+    strip.save(PICTURES / "front.jpg", quality=88)
 
 
 def page(chrome: Chrome, address: str, name: str, height: int, settle_s: float = 0.5) -> None:

@@ -76,7 +76,7 @@ class OrielCornerstone:
         self._tell("SHUTTER O")
         if (state := self._ask("SHUTTER?")) != "O":
             raise UnclearAnswerError(
-                f"{self._name} was told to open its shutter: expected 'O', got '{state}'"
+                f"{self._name} was commanded to open its shutter: expected 'O', got '{state}'"
             )
 
     def make_safe(self) -> None:

@@ -58,7 +58,8 @@ class SerialLine:
             self._port.write(data)
         except serial.SerialTimeoutException:
             raise UnclearAnswerError(
-                f"{self._name} does not take what is sent to it; check its power, cable and address"
+                f"{self._name} does not accept the bytes that are sent to it; check its power, "
+                "cable and address"
             ) from None
         except PORT_FAILURES as error:
             raise self._lost_error(error) from None

@@ -10,10 +10,7 @@ from .analyse import (
     fit_series as fit_series,
 )
 from .bench import open_bench as open_bench
-from .export import (
-    read_dataset as read_dataset,
-    to_tiled as to_tiled,
-)
+from .export import to_tiled as to_tiled
 from .fit import (
     DecayFit as DecayFit,
     fit_decay as fit_decay,

@@ -14,7 +14,9 @@ def _inline(translator: HTML5Translator, node: nodes.math) -> None:
 def _block(translator: HTML5Translator, node: nodes.math_block) -> None:
     number = f'<span class="eqno">({node["number"]})</span>' if node["number"] else ""
     equation = convert(node.astext(), display="block")
-    translator.body.append(f'<div class="equation">{number}{equation}</div>\n')
+    # The tag has the anchor to which links to the equation lead.
+    tag = translator.starttag(node, "div", "", CLASS="equation")
+    translator.body.append(f"{tag}{number}{equation}</div>\n")
     raise nodes.SkipNode
 
 

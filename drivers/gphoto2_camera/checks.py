@@ -48,7 +48,7 @@ def _value(library: Library, names: tuple[str, ...]) -> str | None:
 
 def _exposure_mode(mode: str | None) -> Finding:
     if mode is None:
-        return Finding("warn", "the camera does not tell its exposure mode", "turn its dial to M")
+        return Finding("warn", "the camera does not report its exposure mode", "turn its dial to M")
     if mode not in MANUAL:
         return Finding("refuse", f"its dial is at {mode}: it chooses exposures", "turn it to M")
     return Finding("fine", "dial at M")
@@ -56,7 +56,7 @@ def _exposure_mode(mode: str | None) -> Finding:
 
 def _focus(mode: str | None) -> Finding:
     if mode is None:
-        return Finding("warn", "the camera does not tell its focus mode", "set its lens to MF")
+        return Finding("warn", "the camera does not report its focus mode", "set its lens to MF")
     if not mode.startswith(("Manual", "MF", "M")):
         return Finding(
             "refuse",
@@ -105,7 +105,7 @@ def _image_format(value: str | None) -> Finding:
     if value is None:
         return Finding(
             "warn",
-            "the camera does not tell its image format",
+            "the camera does not report its image format",
             "set its image quality to RAW alone",
         )
     return Finding("fine", f"image format {value}")

@@ -96,8 +96,9 @@ class Exposure:
         if shutter is None or sensitivity is None:
             missing = "shutter time" if shutter is None else "ISO"
             raise DeviceError(
-                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
-                "what 'labrig rig check' shows, or turn its dial to M"
+                f"asked the camera for {requested}, and it does not offer this {missing}: choose "
+                "one of "
+                "those that 'labrig rig check' shows, or turn its dial to M"
             )
         labels = {self._shutter: shutter, self._iso: sensitivity}
         if requested.f_number is not None:

@@ -10,11 +10,12 @@ MODEL_NOT_FOUND, CAMERA_BUSY = -105, -110
 _GONE = (IO, IO_READ, IO_WRITE, USB_FIND)
 
 _LOOK = "look at its cable or network, its battery, and whether it has switched itself off"
+_HELD = "another program holds it; 'labrig rig devices' says which and how to make it let go"
 _ADVICE = {
     NOT_SUPPORTED: "libgphoto2 cannot do this with this camera",
     TIMEOUT: "switch it off and on",
-    USB_CLAIM: "another program holds it; 'labrig rig list' says which and how to make it let go",
-    IO_LOCK: "another program holds it; 'labrig rig list' says which and how to make it let go",
+    USB_CLAIM: _HELD,
+    IO_LOCK: _HELD,
     MODEL_NOT_FOUND: "libgphoto2 knows no camera there; set its USB mode to PTP or PC remote",
     CAMERA_BUSY: "wait until its card lamp is off, leave its menus, and try again",
 }

@@ -38,6 +38,9 @@ class Gphoto2CameraSettings(FrozenModel):
     frame_time
         Time from the end of an exposure until its frame is on the PC and the next can begin, for
         example `2 s`.
+    change_time
+        Time that the camera takes to change a setting between two frames, such as the shutter time,
+        for example `50 ms`. A plan counts it until the run's own frames show it.
     frame_pixels
         Width and height of a frame in pixels, as `labrig rig check` measures them, for example
         `[5634, 3752]`. A plan refuses regions outside of it. Default: unknown before the first
@@ -60,6 +63,7 @@ class Gphoto2CameraSettings(FrozenModel):
     f_numbers: tuple[Annotated[float, Field(gt=0)], ...] = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
     longest_exposure: Positive = 32.0
     frame_time: Annotated[DurationS, Field(ge=0)] = 2.0
+    change_time: Annotated[DurationS, Field(ge=0)] = 0.0
     frame_pixels: FramePixels | None = None
     frame_size: Annotated[SizeBytes, Field(gt=0)] | None = None
     transfer_timeout: Positive = 30.0
@@ -83,6 +87,7 @@ class Gphoto2CameraSettings(FrozenModel):
             isos=tuple(sorted(set(isos))),
             f_numbers=tuple(sorted(set(f_numbers))),
             overhead_s=self.frame_time,
+            change_s=self.change_time,
             frame_bytes=frame_bytes(self.frame_size, self.frame_pixels),
             frame_pixels=self.frame_pixels,
         )

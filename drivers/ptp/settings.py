@@ -32,6 +32,9 @@ class PtpCameraSettings(FrozenModel):
     frame_time
         Time from the end of an exposure until its frame is on the PC and the next can begin, for
         example `2 s`.
+    change_time
+        Time that the camera takes to change a setting between two frames, such as the shutter time,
+        for example `50 ms`. A plan counts it until the run's own frames show it.
     frame_pixels
         Width and height of a frame in pixels, as `labrig rig check` measures them, for example
         `[5634, 3752]`. A plan refuses regions outside of it. Default: unknown before the first
@@ -51,6 +54,7 @@ class PtpCameraSettings(FrozenModel):
     f_numbers: tuple[float, ...] = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
     longest_exposure: Annotated[DurationS, Field(gt=0)] = 32.0
     frame_time: Annotated[DurationS, Field(ge=0)] = 2.0
+    change_time: Annotated[DurationS, Field(ge=0)] = 0.0
     frame_pixels: FramePixels | None = None
     frame_size: Annotated[SizeBytes, Field(gt=0)] | None = None
     transfer_timeout: Annotated[DurationS, Field(gt=0)] = 30.0
@@ -96,6 +100,7 @@ class PtpCameraSettings(FrozenModel):
             isos=self.isos,
             f_numbers=self.f_numbers,
             overhead_s=self.frame_time,
+            change_s=self.change_time,
             frame_bytes=frame_bytes(self.frame_size, self.frame_pixels),
             frame_pixels=self.frame_pixels,
         )

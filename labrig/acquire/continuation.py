@@ -48,20 +48,19 @@ class Continuation:
     connected_time: float
     time: float
 
-    def pace(self, declared_s: float) -> Pace:
+    def pace(self, declared: Pace) -> Pace:
         """Return the pace of the devices, as the record shows it.
 
         Parameters
         ----------
-        declared_s
-            Time from a frame to the next one in seconds, as the driver declares it: the longest,
-            which counts until there are frames.
+        declared
+            Pace as the driver declares it, the longest, which counts until there are frames.
         """
         pairs = [pair for attempt in self.record.attempts for pair in pairwise(attempt.frames)]
         alike = [_gap_s(*pair) for pair in pairs if _settings(pair[0]) == _settings(pair[1])]
         others = [_gap_s(*pair) for pair in pairs if _settings(pair[0]) != _settings(pair[1])]
-        frame_time_s = min(_at_once_s(alike, declared_s), declared_s)
-        change_s = max(_at_once_s(others, frame_time_s) - frame_time_s, 0.0)
+        frame_time_s = min(_at_once_s(alike, declared.frame_time_s), declared.frame_time_s)
+        change_s = max(_at_once_s(others, frame_time_s + declared.change_s) - frame_time_s, 0.0)
         readings_s = [2 * half_s for each in self.record.attempts for half_s in _reading_s(each)]
         # A longer one waited for a sequence to begin.
         return Pace(

@@ -130,7 +130,8 @@ def refuse_shared_outlets(
                 raise UsageError(
                     f"{source}: 'devices.{other}' and 'devices.{key}' are both at {address}, one "
                     f"with the driver {drivers[0]}, the other with {drivers[1]}; a port leads to "
-                    "one board: correct an address or a driver ('labrig rig list' shows the ports)"
+                    "one board: correct an address or a driver ('labrig rig devices' shows the "
+                    "ports)"
                 )
         driver, settings = devices[key]
         if not issubclass(driver, BoardDevice):

@@ -214,9 +214,9 @@ def plan(
         require_inside(protocol.named_regions(), capabilities.frame_pixels)
     recorder = _PlanRecorder(clock, capabilities.overhead_s)
     units, unit_ends_s = protocol.units(), []
-    pace = Pace(capabilities.overhead_s)
+    pace = Pace(capabilities.overhead_s, capabilities.change_s)
     if continuation is not None:
-        pace = continuation.pace(capabilities.overhead_s)
+        pace = continuation.pace(pace)
         completed = continuation.record.completed()
         units = [unit for unit in units if unit.name not in completed]
         recorder.follow(continuation)

@@ -79,8 +79,8 @@ def not_opened(
     if number in _GONE and (taken := _taken(address, programs)):
         return taken
     return (
-        "check that it is plugged in ('labrig rig list' shows the ports) and that no other program "
-        "uses it"
+        "check that it is plugged in ('labrig rig devices' shows the ports) and that no other "
+        "program uses it"
     )
 
 

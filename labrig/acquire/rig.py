@@ -73,7 +73,9 @@ class Rig:
         if key not in self.devices:
             raise MissingDeviceError(
                 f"the protocol needs a {ROLES[key].name}, the rig '{self.name}' has none "
-                f"(only {', '.join(sorted(self.devices)) or 'nothing'}); add it under 'devices:'"
+                f"(only {', '.join(sorted(self.devices)) or 'nothing'}); add '{key}:' under "
+                "'devices:'",
+                key,
             )
         return self.devices[key]
 

@@ -317,7 +317,7 @@ class Optics(FrozenModel):
         if not files:
             raise UsageError(
                 f"{folder}: expected a table NAME.csv for every colour filter, found none; see "
-                f"{shipped} for what one looks like, and 'filters' under 'optics:'"
+                f"{shipped} for an example, and 'filters' under 'optics:'"
             )
         return files
 

@@ -108,6 +108,8 @@ class CameraCapabilities:
         Typical size of a frame in bytes.
     frame_pixels
         Width and height of a frame in pixels; None if they are not known before the first one.
+    change_s
+        Time in seconds by which a change of settings prolongs the time between two frames.
     """
 
     exposures_s: tuple[float, ...]
@@ -116,6 +118,7 @@ class CameraCapabilities:
     overhead_s: float = 0.0
     frame_bytes: int = 0
     frame_pixels: tuple[int, int] | None = None
+    change_s: float = 0.0
 
     def exposure_near(self, exposure_s: float) -> float:
         """Return the offered exposure time nearest to `exposure_s`, such as 1/64 s for 1/60 s.

@@ -11,6 +11,7 @@ from .hyperspectral import (
 from .inputs import (
     AnalysisContext as AnalysisContext,
     Inputs as Inputs,
+    analyse_part as analyse_part,
 )
 from .luminance_table import (
     LuminanceTableOptions as LuminanceTableOptions,

@@ -93,7 +93,7 @@ def card_picture(context: AnalysisContext, lvf: LvfFile) -> CardPicture:
     frames = StripFrames(context)
     shown = frames.of(LvfFrames.FILTER, filter_unit(None))
     strip = frames.find_strip(LvfFrames.FILTER, filter_unit(None)).strip(rising=True)
-    assert lvf.before_camera is not None, "a calibration tells where the filter was"
+    assert lvf.before_camera is not None, "a calibration has the place of the filter"
     rising = lvf.before_camera.rising
     middles = (np.arange(SLICES) + 0.5) / SLICES
     nm = lvf.wavelengths.map().wavelength_nm(middles if rising else 1 - middles)

@@ -92,7 +92,7 @@ def bleaching_warnings(name: str, bleaching: Measured | None) -> Iterator[Result
     if abs(change) > BLEACHED and abs(change) > BLEACHED_SIGMA * bleaching.sigma:
         yield Disturbance(
             "sample-bleached",
-            "at the end of the run the first LED gave {ratio.plus_minus} of what it gave at its "
+            "at the end of the run the first LED gave {ratio.plus_minus} of its light at the "
             "begin; the sample bleaches, or the LED drifts",
             subject=name,
             ratio=bleaching,

@@ -99,7 +99,7 @@ def chart_scene(context: AnalysisContext, chart_role: str, card_role: str | None
     if (chart.value[list(BRIGHT)] < PRECISE_SIGMA * chart.sigma[list(BRIGHT)]).any():
         raise DataError(
             f"{metered.path}: the chart is too dark: expected grey patches {PRECISE_SIGMA:g} σ "
-            "above the dark in every channel; expose for longer, or look whether the lamp burns"
+            "above the dark in every channel; expose for longer, or check that the lamp is on"
         )
     middles = np.array([(x + wide / 2, y + high / 2) for x, y, wide, high in patches])
     place = middles - middles.mean(axis=0)

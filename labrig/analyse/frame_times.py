@@ -18,8 +18,8 @@ def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[ResultW
         warnings.append(
             Disturbance(
                 "journal-torn",
-                "the journal's last line is torn: labrig was cut off while writing it; what it "
-                "would have said does not count",
+                "the journal's last line is torn: labrig was cut off while writing it; this "
+                "line does not count",
             )
         )
     late = [frame for frame in run.frames(role) if frame.late_s > LATE_S]

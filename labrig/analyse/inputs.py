@@ -164,19 +164,9 @@ def analyse_parts(context: AnalysisContext) -> AnalysedParts:
     warnings: list[ResultWarning] = []
     inputs = {"": context.inputs}
     for link in counted(context.protocol.chain(), "analysing parts"):
-        kind = link.protocol.protocol
-        analyse_link = measurement(kind, str(context.run.folder)).load("analysis")
         known = inputs.get(link.sample, inputs[""])
-        link_part = AnalysisContext(
-            context.run.part(link.name),
-            link.protocol,
-            context.rig,
-            context.overrides,
-            known,
-            context.run.without_part(link.name) if link.sample else None,
-        )
         try:
-            result: RunResult = analyse_link(link_part)
+            result = _analysed(context, link, known)
             if result.failures():
                 raise FitError("; ".join(result.failures()))
         except (DataError, FitError) as error:
@@ -192,3 +182,59 @@ def analyse_parts(context: AnalysisContext) -> AnalysedParts:
         raise next(iter(failures.values()))
     failed = {name: str(error) for name, error in failures.items()}
     return AnalysedParts(results, failed, inputs, tuple(warnings))
+
+
+def analyse_part(
+    context: AnalysisContext, name: str, results: Mapping[str, RunResult]
+) -> RunResult:
+    """Analyse one part of a chain, with the results of the parts before it as they are.
+
+    Parameters
+    ----------
+    context
+        The chain.
+    name
+        Name of the part.
+    results
+        Results of the parts by name; those that come later do not count.
+
+    Returns
+    -------
+    RunResult
+        Result of the part.
+
+    Raises
+    ------
+    DataError, FitError
+        The part cannot be analysed.
+
+    Examples
+    --------
+    >>> from labrig.analyse import analyse_part
+    >>> analyse_part(context, "decay", result.parts).kind  # doctest: +SKIP
+    'decay'
+    """
+    inputs = {"": context.inputs}
+    for link in context.protocol.chain():
+        known = inputs.get(link.sample, inputs[""])
+        if link.name == name:
+            return _analysed(context, link, known)
+        if link.name in results:
+            inputs[link.sample] = known.updated_by(results[link.name])
+    raise DataError(f"{context.run.folder}: expected a chain with a part '{name}', it has none")
+
+
+def _analysed(context: AnalysisContext, link: Any, known: Inputs) -> RunResult:
+    """Return the result of a part of a chain."""
+    kind = link.protocol.protocol
+    result: RunResult = measurement(kind, str(context.run.folder)).load("analysis")(
+        AnalysisContext(
+            context.run.part(link.name),
+            link.protocol,
+            context.rig,
+            context.overrides,
+            known,
+            context.run.without_part(link.name) if link.sample else None,
+        )
+    )
+    return result

@@ -158,7 +158,7 @@ def _off_s(path: Path, text: str | None, series: Series) -> float:
             begin, end = (series.clock.text(t_s) for t_s in (first_s, last_s))
             raise UsageError(
                 f"{path}: expected times after the light went off, got a clock from {begin} to "
-                f"{end}, which does not tell when that was; say it with --off"
+                f"{end}, which does not contain that time; state it with --off"
             )
         return 0.0
     try:

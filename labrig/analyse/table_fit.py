@@ -21,6 +21,7 @@ from labrig.analyse.table_checks import (
 from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import FitError, UsageError
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.quantity import FRACTION, parse
 from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.results import (
@@ -112,7 +113,7 @@ class TableFitOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class FittedTable:
+class FittedTable(NotebookViews):
     """Fit of one region of a table.
 
     Attributes
@@ -428,7 +429,8 @@ def _refuse_rise(path: Path, series: Series) -> None:
         start, until_s = series.clock.text(t_s[peak]), _clock_s(series, t_s[peak])
         raise FitError(
             f"{path}: expected a signal that decays, got one that rises until {until_s:.12g} s; "
-            f"fit what follows with '--from {start}', and say with --origin when the light went off"
+            f"fit the later rows with '--from {start}', and state with --origin when the light "
+            "went off"
         )
 
 

@@ -474,7 +474,7 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
         )
     if unknown := folder.unknown_files():
         yield (
-            f"{folder.path / 'frames'}: the journal does not tell of {_listed(unknown)}, which a "
+            f"{folder.path / 'frames'}: the journal does not mention {_listed(unknown)}, which a "
             "crash or a failing disk left; they are kept, and nothing is made of them"
         )
     files = [file for attempt in record.completed().values() for file in attempt.files]

@@ -423,7 +423,7 @@ class _Connections:
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except (OSError, UnicodeError) as error:
             raise DeviceError(
-                f"nobody answers at {address} ({error}); check that the device is on and in the "
+                f"no answer from {address} ({error}); check that the device is on and in the "
                 "same network, and its address"
             ) from None
         self._stack.callback(connected.close)

@@ -29,7 +29,7 @@ from labrig.calibration import REFERENCE_KIND
 from labrig.foundation import resources
 from labrig.foundation.errors import DiskError, MissingDeviceError, ProtocolError, UsageError
 from labrig.foundation.plugins import bench_check
-from labrig.foundation.yaml_file import yaml_text
+from labrig.foundation.yaml_file import read_yaml, yaml_text
 from labrig.record import (
     CALIBRATIONS_FILE,
     JOURNAL,
@@ -128,9 +128,10 @@ class Recording:
     def notes(self) -> tuple[str, ...]:
         """Return notes for the user before the run, one line each."""
         unmeasured = (
-            f"what {self.protocol.protocol} finds rests on {name}, of which the rig file names no "
-            "run ('optics:'); frames will be kept: measure it, too, and name it to labrig process "
-            "--optics"
+            f"the result of {self.protocol.protocol} needs {name}, and the rig file names no run "
+            "of "
+            "it under 'optics:'; the frames are kept: measure it later, and name it to labrig "
+            "process --optics"
             for name in self.protocol.unmeasured(self.rig)
         )
         check = bench_check()
@@ -304,12 +305,14 @@ def _planned(protocol: ProtocolModel, path: Path, rig: RigFile, rig_path: Path) 
 
 @contextmanager
 def _naming(path: Path, rig_path: Path) -> Iterator[None]:
-    """Name the file of a protocol in a refusal; of a shipped one how to get a file to change."""
+    """Name the file in a refusal; of a shipped protocol or rig how to get another one."""
     try:
         yield
     except ProtocolError as error:
         if isinstance(error, MissingDeviceError):
-            error.args = (f"{error} of {rig_path}",)
+            is_shipped = rig_path in resources.names("config").values()
+            where = f"a rig file of your own, or plan on {_shipped_rigs_with(error.key)}"
+            error.args = (f"{error} of {where if is_shipped else rig_path}",)
         elif _is_shipped(path):
             error.args = (
                 f"{path.stem}: {error}; keys of a shipped protocol are changed in a copy: "
@@ -318,6 +321,12 @@ def _naming(path: Path, rig_path: Path) -> Iterator[None]:
         elif str(rig_path) not in str(error):
             error.args = (f"{path}: {error}",)
         raise
+
+
+def _shipped_rigs_with(key: str) -> str:
+    """Return the names of the shipped rigs that have a device."""
+    rigs = resources.names("config")
+    return " or ".join(name for name in rigs if key in read_yaml(rigs[name])["devices"])
 
 
 def _is_shipped(path: Path) -> bool:

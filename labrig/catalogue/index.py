@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import date, datetime
+from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from functools import cache
 from importlib.metadata import version
@@ -289,6 +290,11 @@ def list_runs(runs: Path, run_filter: RunFilter) -> list[RunSummary]:
     """
     if not runs.is_dir():
         raise UsageError(f"{runs}: no such folder; give the one with the run folders as --runs")
+    if is_run(runs):
+        raise UsageError(
+            f"{runs}: expected a folder with run folders, got a run folder; give --runs "
+            f"{runs.parent}, or show this run: labrig runs show {runs}"
+        )
     return [run for run in read_summaries(runs) if run_filter.admits(run)]
 
 
@@ -342,18 +348,14 @@ def _find_folder(run: Path, runs: Path) -> Path:
         require_kind(run, RUN)
     if not matches and run.exists() and (around := run_around(run)) is not None:
         raise UsageError(f"{run}: this is a part of a run; the run is {around}")
-    problem = f"{len(matches)} runs begin so" if matches else _no_such_run(str(run), runs)
+    problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
+    names = [path.name for path in _run_folders(runs, "")]
+    close = get_close_matches(str(run), names, n=1)
+    suggestion = f"; did you mean '{close[0]}'?" if close and not matches else ""
     raise UsageError(
-        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}; see: "
-        f"labrig runs --runs {runs}"
+        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "
+        f"labrig runs --runs {runs}{suggestion}"
     )
-
-
-def _no_such_run(name: str, runs: Path) -> str:
-    from difflib import get_close_matches
-
-    near = get_close_matches(name, [path.name for path in _run_folders(runs, "")], 1)
-    return f"there is no such run, did you mean '{near[0]}'?" if near else "there is no such run"
 
 
 def _run_folders(runs: Path, beginning: str) -> Iterator[Path]:

@@ -76,7 +76,7 @@ def _run(arguments: Sequence[str]) -> int:
 
     if any(_NO_TEXT.search(argument) for argument in arguments):
         encoding = sys.getfilesystemencoding()
-        remedy = "; rename what is not" if encoding == "utf-8" else f"; {_SET_LOCALE}"
+        remedy = "; rename the others" if encoding == "utf-8" else f"; {_SET_LOCALE}"
         return _print_error(
             f"expected arguments in {encoding.upper()}, got {' '.join(map(ascii, arguments))}"
             f"{remedy}",
@@ -132,6 +132,8 @@ def _wrong_call(error: "TyperException") -> str:
     # Some commands show all their options only for what is named.
     command = getattr(getattr(context, "command", None), "helped_by", command)
     options = () if context is None else [each.opts for each in context.command.params]
+    if "'%Y-%m-%d'" in message:
+        message = re.sub("does not match the formats.*", "is no day such as 2026-11-21", message)
     if "unexpected extra argument" in message and ["--rig"] in options:
         message += ": a rig is given by --rig"
     return f"{message} (see {command} --help)"
@@ -148,7 +150,7 @@ def _unwritable(error: UnicodeEncodeError) -> str:
     # Of a long text with the name in it, the part before it that cannot be written.
     name = spelled(error.object[max(error.end - MAX_SHOWN, 0) : error.end], "ascii").strip()
     if error.encoding == "utf-8":
-        return f"{name}: expected names of files and folders in UTF-8; rename what is not"
+        return f"{name}: expected names of files and folders in UTF-8; rename the others"
     return f"{name}: the locale has file names in {error.encoding} only; {_SET_LOCALE}"
 
 

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labrig.cli.completion import complete_rig
+from labrig.foundation.activity import activity
 from labrig.foundation.errors import DeviceError, LabrigError, UsageError
 
 if TYPE_CHECKING:
-    from labrig.setup import Candidate, Dialogue
+    from labrig.setup import Candidate, Dialogue, NewRig
 
 
 def new(
@@ -66,23 +67,24 @@ def new(
     if not rig.devices:
         raise UsageError(
             "no device was found or chosen, so that there is nothing to write; plug the boards in "
-            "('labrig rig list' shows them), name one (--set lamp.driver=numato --set "
+            "('labrig rig devices' shows them), name one (--set lamp.driver=numato --set "
             "lamp.address=COM3), or try it with --simulated sim"
         )
     if no_check or not dialogue.confirm("Connect now? The lamp flashes, door and camera move."):
         write_text(file, rig.text())
-        _tell_next(file)
+        _tell_next(file, rig)
         return
     try:
         if not yes:
             rig = set_up(rig, dialogue, str(file))
-        rig, report = measure(rig, str(file))
+        with activity("measuring the devices"):
+            rig, report = measure(rig, str(file))
     except LabrigError as error:
         write_text(file, rig.text())  # what was answered is kept
         error.args = (f"{error}; {file} is written, without what could not be measured",)
         raise
     write_text(file, rig.text())
-    _tell_next(file)
+    _tell_next(file, rig)
     if failed := (*report.failures, *report.refusals):
         raise DeviceError(f"{file} is written, with devices to look at: {'; '.join(failed)}")
 
@@ -127,17 +129,20 @@ def _connected(room: dict[str, Any] | None, dialogue: "Dialogue") -> "list[Candi
     return candidates(discovery)
 
 
-def _tell_next(file: Path) -> None:
+def _tell_next(file: Path, made: "NewRig") -> None:
     from labrig.acquire import plan, planned_rig, read_protocol, read_rig_file
     from labrig.foundation import resources
 
     place = file if file.is_absolute() else f"./{file}"
     typer.echo(f"{file} is written, and yours to change")
+    for line in made.unmeasured():
+        typer.echo(line)
     rig = read_rig_file(file)
     try:
-        decay = read_protocol(resources.names(resources.PROTOCOLS)["decay"])
-        adapted, _ = decay.adapted_to(planned_rig(rig, str(file)), chosen=())
-        plan(adapted, rig, str(file))
+        with activity("planning a decay"):
+            decay = read_protocol(resources.names(resources.PROTOCOLS)["decay"])
+            adapted, _ = decay.adapted_to(planned_rig(rig, str(file)), chosen=())
+            plan(adapted, rig, str(file))
     except LabrigError as error:
         typer.echo(f"! a decay cannot run on it yet: {error}")
     else:

@@ -1,14 +1,13 @@
 """Text of a plan: a summary, then its units, those alike folded into one line."""
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from shutil import get_terminal_size
-from textwrap import TextWrapper
 from typing import TYPE_CHECKING
 
 from labrig.acquire import CAMERA, Plan, Step, shutter_text
+from labrig.cli.screen import laid_out
 from labrig.cli.wording import counted, measurement
 from labrig.consent import calls, has_consent, starting
 from labrig.foundation.quantity import duration_text
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
 
 #: Waits that are shorter in all are left out, in seconds.
 SHORT_S = 60.0
-#: A number with its unit, which are not parted by the end of a line.
-_QUANTITY = re.compile(r"(\d) (s|ms|min|h)\b")
 #: Column at which units begin, and width of a page where there is no terminal.
 INDENT, WIDTH = 26, 120
 #: Number of steps by hand that are written out for units that are folded.
@@ -102,15 +99,9 @@ def folded_units(plan: Plan) -> Iterator[str]:
 
     Lines are as long as the terminal is wide, 120 characters if there is none.
     """
-    wrapper = TextWrapper(
-        max(get_terminal_size((WIDTH, 24)).columns, 2 * INDENT),
-        subsequent_indent=" " * (INDENT + 2),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+    width = get_terminal_size((WIDTH, 24)).columns
     for line in _unit_lines(plan):
-        unbroken = _QUANTITY.sub("\\1\N{NO-BREAK SPACE}\\2", line)
-        yield from (part.replace("\N{NO-BREAK SPACE}", " ") for part in wrapper.wrap(unbroken))
+        yield from laid_out(line, width, min(INDENT + 2, width // 2))
 
 
 def _unit_lines(plan: Plan) -> Iterator[str]:

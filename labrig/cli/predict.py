@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_material
+from labrig.cli.screen import echo, echo_table
 from labrig.foundation.result_warning import ResultWarning, Undetermined, warning_lines
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from labrig.bench import Recording
     from labrig.predict import PatchPrediction, Prediction, Remedy
+
+    #: Heads of the columns of a table, and its rows.
+    _Rows = tuple[list[str], list[list[str]]]
 
 PredictOption = Annotated[
     list[str] | None,
@@ -32,8 +34,8 @@ MeteredOption = Annotated[
     str | None,
     typer.Option(
         "--metered",
-        help="With --predict, if no run tells how bright the material is: what metering chooses "
-        "for the first frame, such as '0.5 s'.",
+        help="With --predict, if no run has the brightness of the material: the exposure that "
+        "metering chooses for the first frame, such as '0.5 s'.",
     ),
 ]
 
@@ -72,48 +74,45 @@ def predict_and_print(
 
 
 def _print_prediction(prediction: "Prediction", duration_s: float) -> None:
-    from rich.console import Console
-
-    console = Console(highlight=False)
     for patch in prediction.patches:
-        console.print(_states(prediction, patch))
+        echo(_title(prediction, patch), bold=True)
+        echo_table(*_states(prediction.patches[patch]))
         for line in warning_lines(_warnings(prediction, patch)):
-            console.print(line, style="yellow", markup=False)
+            echo(line, fg="yellow")
         if any(remedy.helps for remedy in prediction.remedies):
-            console.print(_remedies(prediction, patch, duration_s))
+            echo("\nwhat would halve it", bold=True)
+            echo_table(*_remedies(prediction, patch, duration_s))
+        echo()
     useless = [remedy.change.description for remedy in prediction.remedies if not remedy.helps]
     if useless:
-        console.print(f"no help: {', '.join(useless)}")
+        echo(f"no help: {', '.join(useless)}")
     for line in warning_lines(prediction.warnings):
-        console.print(line, style="yellow", markup=False)
+        echo(line, fg="yellow")
     for line in prediction.notes:
-        console.print(line, style="dim")
+        echo(line, dim=True)
 
 
-def _states(prediction: "Prediction", patch: str) -> "Table":
-    from rich.table import Table
-
+def _states(predicted: "PatchPrediction") -> "_Rows":
+    """Return head and rows of the states of a patch."""
     from labrig.results import with_uncertainty
 
-    predicted = prediction.patches[patch]
-    table = Table(title=_title(prediction, patch), title_justify="left")
     has_order = any(order != 1 for order in predicted.kinetic_order)
     rate_heading = "rate at lamp off / s⁻¹" if has_order else "k_r / s⁻¹"
-    for heading in (
-        "state", rate_heading, "σ", *(["order b"] if has_order else []), "σ of amplitude", "noise"
-    ):  # fmt: skip
-        table.add_column(heading)
+    order_heading = ["order b"] if has_order else []
+    head = ["state", rate_heading, "σ", *order_heading, "σ of amplitude", "noise"]
     orders = list(zip(predicted.kinetic_order, predicted.kinetic_order_sigma, strict=True))
-    for i, rate in enumerate(predicted.rate_per_s):
-        table.add_row(
+    rows = [
+        [
             str(i + 1),
             with_uncertainty(rate, predicted.rate_per_s_sigma[i]),
             _percent(predicted.rate_per_s_sigma[i] / rate),
             *([with_uncertainty(*orders[i])] if has_order else []),
             _percent(predicted.amplitude_dn_per_s_sigma[i] / predicted.amplitude_dn_per_s[i]),
             _noise(predicted, i),
-        )
-    return table
+        ]
+        for i, rate in enumerate(predicted.rate_per_s)
+    ]
+    return head, rows
 
 
 def _title(prediction: "Prediction", patch: str) -> str:
@@ -175,39 +174,29 @@ def _warnings(prediction: "Prediction", patch: str) -> list[ResultWarning]:
     return warnings
 
 
-def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table":
-    from rich.table import Table
-
+def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "_Rows":
+    """Return head and rows of the changes that help; one that halves σ is marked."""
     predicted = prediction.patches[patch]
     count = len(predicted.rate_per_s)
-    table = Table(title="what would halve it", title_justify="left")
-    table.add_column("change")
-    for heading in ("σ",) if count == 1 else [f"σ {i + 1}" for i in range(count)]:
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("σ ×", justify="right", no_wrap=True)
-    if not predicted.resolves_all_states:
-        table.add_column("tells all", justify="right", no_wrap=True)
-    table.add_column("lab time", justify="right", no_wrap=True)
+    resolves = [] if predicted.resolves_all_states else ["finds all"]
+    sigmas = ["σ"] if count == 1 else [f"σ {i + 1}" for i in range(count)]
+    head = ["change (* halves σ)", *sigmas, "σ ×", *resolves, "lab time"]
+    rows = []
     for remedy in prediction.remedies:
         if not remedy.helps:
             continue
         after = remedy.patches[patch]
-        table.add_row(
-            remedy.change.description,
+        rows.append([
+            f"{remedy.change.description}{' *' if remedy.halves else ''}",
             *(
                 _percent(sigma / rate)
                 for sigma, rate in zip(after.rate_per_s_sigma, after.rate_per_s, strict=True)
             ),
             f"{remedy.gain:.2f}",
-            *(
-                []
-                if predicted.resolves_all_states
-                else ["yes" if after.resolves_all_states else "no"]
-            ),
+            *(["yes" if after.resolves_all_states else "no"] if resolves else []),
             _extra_time(remedy, duration_s),
-            style="bold" if remedy.halves else "",
-        )
-    return table
+        ])  # fmt: skip
+    return head, rows
 
 
 def _extra_time(remedy: "Remedy", duration_s: float) -> str:

@@ -134,8 +134,8 @@ def process(
         list[str] | None,
         typer.Option(
             "--optics",
-            help="KEY=PATH: what a key of the rig file's 'optics:' is to name instead, a file or a "
-            "run, such as lvf=PATH. Repeatable.",
+            help="KEY=PATH: another file or run for a key of the rig file's 'optics:', such as "
+            "lvf=PATH. Repeatable.",
         ),
     ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from labrig.cli.completion import complete_protocol
+from labrig.cli.screen import echo_table
 from labrig.foundation.input_file import read_text
 
 app = typer.Typer(help="The protocols that can be run.")
@@ -41,29 +42,25 @@ def list_protocols() -> None:
 
     Protocols of installed packages, which have no shipped file, come last.
     """
-    from rich.console import Console
-    from rich.table import Table
-
     from labrig.acquire import read_protocol
     from labrig.foundation import plugins, resources
     from labrig.foundation.errors import UsageError
 
-    table = Table(box=None, pad_edge=False)
-    for title in ("file", "protocol", "measures"):
-        table.add_column(title, no_wrap=title != "measures")
-    shipped = set()
+    rows, shipped = [], set()
     for path in resources.names("protocols").values():
         model = read_protocol(path)
         shipped.add(model.protocol)
-        table.add_row(path.stem, model.protocol, _summary(read_text(path)))
+        other = "" if path.stem == model.protocol else f" (protocol {model.protocol})"
+        rows.append((path.stem, _summary(read_text(path)) + other))
     for name in plugins.names(plugins.MEASUREMENTS):
         if name not in shipped:
             try:
                 described = plugins.measurement(name).load("protocol").__doc__ or ""
             except UsageError as error:
                 described = str(error)
-            table.add_row("–", name, described.strip().partition("\n")[0])
-    Console().print(table)
+            first = described.strip().partition("\n")[0]
+            rows.append((name, f"{first} (of an installed package, without a file)"))
+    echo_table(("protocol", "measures"), rows)
 
 
 def _summary(text: str) -> str:

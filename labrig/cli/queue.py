@@ -9,6 +9,8 @@ import typer
 from labrig.cli.completion import complete_protocol
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.protocol import protocol_path
+from labrig.cli.screen import echo_table
+from labrig.foundation.activity import activity
 from labrig.foundation.named_files import beside, is_path
 
 if TYPE_CHECKING:
@@ -69,10 +71,9 @@ def list_(
     runs: Runs = RUNS,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
-    """What is in the queue, how far it is, and what was found."""
+    """The runs of the queue, their progress and their results."""
     from json import dumps
 
-    from labrig.foundation.number_format import aligned
     from labrig.queue import entries, queue_report, read_queue
 
     listed = entries(read_queue(queue), runs)
@@ -82,7 +83,7 @@ def list_(
         typer.echo(f"nothing in {queue}")
     else:
         table = queue_report(queue.stem, listed).sections[0].tables[0]
-        typer.echo("\n".join(aligned([table.head, *table.rows])))
+        echo_table(table.head, table.rows)
 
 
 @app.command("run")
@@ -101,9 +102,10 @@ def run(
         bool, typer.Option("--verbose", help="Print every command to a device and its answer.")
     ] = False,
 ) -> None:
-    """Measure what is waiting or was interrupted. The last line is the page of results."""
-    from labrig.cli.progress import Terminal
-    from labrig.queue import run_queue
+    """Measure the runs that wait or were interrupted. The last line is the page of results."""
+    with activity("reading the queue"):
+        from labrig.cli.progress import Terminal
+        from labrig.queue import run_queue
 
     typer.echo(run_queue(queue, runs, _Person(queue, runs, Terminal(), yes, verbose)))
 
@@ -121,14 +123,15 @@ class _Person:
         self._verbose = verbose
 
     def prepare(self, queued: "QueuedRun") -> "Recording":
-        from labrig.acquire import changes_with_absolute_paths, read_protocol
-        from labrig.bench import Recording
+        with activity("preparing the run"):
+            from labrig.acquire import changes_with_absolute_paths, read_protocol
+            from labrig.bench import Recording
 
-        rig = None if queued.rig is None else beside(queued.rig, self._folder)
-        protocol = protocol_path(beside(queued.protocol, self._folder))
-        model = type(read_protocol(protocol))
-        changes = changes_with_absolute_paths(queued.changes, model, self._folder)
-        return Recording.prepare(protocol, rig_path(rig), self._runs, changes)
+            rig = None if queued.rig is None else beside(queued.rig, self._folder)
+            protocol = protocol_path(beside(queued.protocol, self._folder))
+            model = type(read_protocol(protocol))
+            changes = changes_with_absolute_paths(queued.changes, model, self._folder)
+            return Recording.prepare(protocol, rig_path(rig), self._runs, changes)
 
     def watch(self, rig: "RigFile") -> "Watch":
         from labrig.cli.progress import progress

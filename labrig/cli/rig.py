@@ -2,15 +2,18 @@
 
 import logging
 import sys
+from collections import Counter
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from labrig.cli import default_rig, new_rig, page
 from labrig.cli.default_rig import RigArgument, rig_path
 from labrig.cli.detachable_stream import DetachableStream
+from labrig.cli.screen import echo
+from labrig.cli.wording import counted
 from labrig.foundation.errors import DeviceError, ProtocolError
 
 if TYPE_CHECKING:
@@ -18,7 +21,13 @@ if TYPE_CHECKING:
 
 app = typer.Typer(help="The devices of a bench.")
 
-_STYLES = {"refuse": "bold red", "failed": "bold red", "warn": "yellow", "fine": "green"}
+_STYLES: dict[str, dict[str, Any]] = {
+    "refuse": {"fg": "red"},
+    "failed": {"fg": "red"},
+    "warn": {"fg": "yellow"},
+    "fine": {"fg": "green"},
+}
+_TROUBLES = {"failed": "failure", "refuse": "refused setting", "warn": "warning"}
 
 
 @app.callback()
@@ -26,13 +35,13 @@ def rigs() -> None:
     """The devices of a bench."""
 
 
-@app.command("list")
+@app.command("devices")
 def list_devices(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """Serial ports, USB cameras and spectrometers on this PC, each with its line for a rig file.
 
-    Says, too, what else may hold a camera and how to make it let go. Nothing is switched or sent.
+    Names programs that may hold a camera, and how to end them. Nothing is switched or sent.
     """
     from dataclasses import asdict
     from json import dumps
@@ -81,7 +90,7 @@ def check(
     if json:
         typer.echo(dumps(report.to_json()))
     else:
-        _print_table(report)
+        _print_report(report)
     _raise_failures(report, path)
 
 
@@ -112,20 +121,18 @@ def _print_discovery(discovery: "Discovery") -> None:
         roles.add(role)
 
 
-def _print_table(report: "RigReport") -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    table = Table(title=report.rig, title_justify="left", show_header=False)
-    for device, assessment, what, value in report.rows():
+def _print_report(report: "RigReport") -> None:
+    """Print the verdict, then each device with its settings and measured times."""
+    rows = list(report.rows())
+    assessed = Counter(assessment for _, assessment, _, _ in rows)
+    troubles = [counted(assessed[kind], noun) for kind, noun in _TROUBLES.items() if assessed[kind]]
+    echo(f"{report.rig}: {', '.join(troubles) or 'all is fine'}", bold=True)
+    for device, assessment, what, value in rows:
+        text = f"{what.removesuffix(':')}: {value}" if value else what
         if device:
-            table.add_section()
-        table.add_row(
-            Text(device, style="bold"), Text(assessment, style=_STYLES.get(assessment, "")),
-            Text(what), Text(value),
-        )  # fmt: skip
-    Console().print(table)
+            echo(f"\n{device}: {text}", bold=True, **_STYLES.get(assessment, {}))
+        else:
+            echo(f"  {assessment:6}  {text}", **_STYLES.get(assessment, {}))
 
 
 def _raise_failures(report: "RigReport", path: Path) -> None:

@@ -92,9 +92,9 @@ def plan(
     ] = False,
     json: Json = False,
 ) -> None:
-    """Print what a protocol will do, how long it takes and what it needs; touch nothing.
+    """Print the steps of a protocol, their times and the devices it needs; touch nothing.
 
-    With --predict: how well it will know the rates of a material, and what would halve their σ.
+    With --predict: the expected σ of the rates of a material, and changes that would halve it.
     """
     from labrig.bench import free_disk_bytes
     from labrig.cli.plan_text import folded_units, summary

@@ -214,7 +214,10 @@ def compare(
 
     from labrig.catalogue import compare_runs, find_run
 
-    comparison = compare_runs(find_run(run, runs), find_run(other, runs), reference)
+    first, second = find_run(run, runs), find_run(other, runs)
+    if first.resolve() == second.resolve():
+        raise UsageError(f"expected two runs, got {first} twice; name another one (labrig runs)")
+    comparison = compare_runs(first, second, reference)
     if json:
         patches = [
             {**asdict(patch), "assessment": patch.assessment} for patch in comparison.patches
@@ -289,7 +292,7 @@ def note(
     text: Annotated[str, typer.Argument(help="What there is to say; Markdown if you like.")],
     runs: Runs = Path("runs"),
 ) -> None:
-    """Add a note to a run: what you saw, what was odd. Kept in notes.md in its folder."""
+    """Add a note to a run, such as an observation; it is kept in notes.md in its folder."""
     from labrig.catalogue import find_run
     from labrig.foundation.clock import SystemClock
     from labrig.record import add_note

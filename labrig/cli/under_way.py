@@ -23,8 +23,9 @@ EMPTY_LINE = "\r\x1b[2K"
 #: Commands that only compute: they ask nothing, show nothing of their own, and end.
 COMPUTING = frozenset(
     {
-        *("compare", "figures", "fit", "frame", "leds", "material", "optics", "plan", "process"),
+        *("figures", "fit", "frame", "leds", "material", "optics", "plan", "process", "reproduce"),
         *("protocol", "render", "runs", "schema", "seal", "verify"),
+        *("driver new", "queue add", "queue list"),
     }
 )
 _hidden = threading.Event()
@@ -47,7 +48,7 @@ def showing_work(arguments: Sequence[str]) -> Iterator[None]:
     if not sys.stderr.isatty():
         yield
         return
-    is_work = bool(arguments) and arguments[0] in COMPUTING
+    is_work = not COMPUTING.isdisjoint({*arguments[:1], " ".join(arguments[:2])})
     out, err = sys.stdout, sys.stderr
     line = _Line(err)
     sys.stdout = cast(TextIO, _Erasing(out, line))

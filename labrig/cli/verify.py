@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_run
+from labrig.cli.screen import echo
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.user_folder import settings_file
 
@@ -55,9 +56,9 @@ def verify(
         typer.echo(json_text.dumps(_content(folder, verification), ensure_ascii=False, indent=2))
     else:
         for line in (*verification.intact, verification.seal_line):
-            typer.echo(line)
+            echo(line)
     for line in verification.doubtful:
-        typer.echo(f"warning: {line}", err=True)
+        echo(f"warning: {line}", err=True)
     if not verification.is_intact:
         named, more = verification.changed[:_MAX_NAMED], verification.changed[_MAX_NAMED:]
         others = f"; {len(more)} more, all of them with --json" if more else ""
@@ -90,10 +91,13 @@ def seal(
     from labrig.process import seal_run
     from labrig.seal import read_key
 
-    lab_key = read_key(key_file() if key is None else key)
+    path = key_file() if key is None else key
+    if not path.exists():
+        raise UsageError(f"{path}: there is no such key; make one: labrig key new NAME")
+    lab_key = read_key(path)
     for folder in [find_run(each, runs) for each in run]:
         made = seal_run(folder, lab_key, SystemClock().wall())
-        typer.echo(
+        echo(
             f"{folder}: sealed {made.files.sealed}, {len(made.files.sha256)} files, by "
             f"{lab_key.name} ({made.signer.fingerprint})"
         )
@@ -169,7 +173,7 @@ def trust(
     make_folder(trusted.parent)
     write_text(trusted, (before | new_signers).text())
     for key, name in new_signers.names.items():
-        typer.echo(f"{name} ({key.fingerprint})")
+        echo(f"{name} ({key.fingerprint})")
 
 
 def key_file() -> Path:
@@ -194,4 +198,4 @@ def _trusted_file() -> Path:
 
 def _print(key: "LabKey", path: Path) -> None:
     typer.echo(key.public_line)
-    typer.echo(f"{key.name} ({key.public.fingerprint}); private key: {path}", err=True)
+    echo(f"{key.name} ({key.public.fingerprint}); private key: {path}", err=True)

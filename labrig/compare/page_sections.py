@@ -174,8 +174,8 @@ def _colours_table(comparison: RenderedComparison) -> Table:
         rows=tuple(rows),
         caption="CIEDE2000 between photographs and renderings, mean over all times and, in "
         "brackets, the largest; matched: with one factor of each channel for all times, without "
-        "the errors of the measured spectrum and of the camera's curves; noise alone: what the "
-        "photographs' noise would make. Rendered over photographed ratio of glow to reflected "
+        "the errors of the measured spectrum and of the camera's curves; noise alone: from the "
+        "noise of the photographs. Rendered over photographed ratio of glow to reflected "
         "light − 1, mean and, in brackets, furthest over all times.",
     )
 
@@ -216,7 +216,7 @@ def _ratio_table(patch: RenderedPatch) -> Table:
         rows=tuple(rows),
         caption=f"{patch.each.patch}: glow in {in_words} of the light that {ratio.reflected_by} "
         f"reflects, in {ratio.channel}, of photographs and of the measured material; ΔE of this at "
-        "L* = 50, what noise alone would make of it, and ΔE with one exposure.",
+        "L* = 50, ΔE from noise alone, and ΔE with one exposure.",
     )
 
 
@@ -288,7 +288,7 @@ def _overview(comparison: LampsComparison) -> Table:
         rows=tuple(_lamp_row(lamp) for lamp in comparison.lamps),
         caption="CIEDE2000 between photographs and renderings, mean over the samples and, in "
         "brackets, the largest; by errors: the root mean square that the errors of both alone "
-        "would make; reflected: CIEDE2000 to what is reflected only. Off: rendered over "
+        "would make; reflected: CIEDE2000 to the reflected light only. Off: rendered over "
         "photographed light − 1, mean over all samples and channels that are not dark, and the "
         "furthest value in σ. Re-radiated: share of the luminance, mean and largest.",
     )

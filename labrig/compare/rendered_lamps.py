@@ -329,7 +329,7 @@ def _description(result: PredictedUnderLamps, conversion: Viewing) -> tuple[str,
     return (
         f"The dark room is rendered under each lamp with the matrices of {result.fluorescence}, in "
         "bands of 10 nm. Light of a sample is divided by that of the grey card in its place, which "
-        "tells how bright the lamp is in each channel; under a narrow lamp the gains of the "
+        "measures the brightness of the lamp in each channel; under a narrow lamp the gains of the "
         f"channels are those under {result.balance}. Under a lamp that the camera hardly sees, it "
         "is divided by the brightest rendered light, and one strength for all samples is fitted.",
         "σ of a rendering is that of the prediction in the run's result: lamps' spectra, camera's "

@@ -271,7 +271,9 @@ def _by_area(materials: Sequence[Material], fractions: Sequence[float]) -> Mater
         states=tuple(states),
         scale=materials[0].scale,
         albedo=_mixed_albedo(materials, fractions),
-        provenance=Provenance(source=f"{parts} of the area, in areas too small to be told apart"),
+        provenance=Provenance(
+            source=f"{parts} of the area, in areas too small to be distinguished"
+        ),
     )
 
 

@@ -1,4 +1,4 @@
-"""Exports of runs and results to NeXus, xarray and Tiled.
+"""Exports of runs and results to NeXus, pandas, xarray and Tiled.
 
 Names are listed in `__init__.pyi`, and loaded when first used.
 """

@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labrig.export.dataset import read_dataset
+from labrig.export.dataset import dataset_of
 from labrig.foundation.errors import UsageError
 from labrig.record import Document, read_journal, read_run
+from labrig.results import read_result
 
 if TYPE_CHECKING:
     from tiled.client.container import Container
@@ -54,7 +55,7 @@ def to_tiled(run: Path | str, client: "Container") -> list[str]:
     except ImportError:
         raise UsageError(
             "Tiled needs bluesky-tiled-plugins, which is not installed; install it with: "
-            "python -m pip install bluesky-tiled-plugins xarray"
+            "python -m pip install 'labrig[tiled]'"
         ) from None
     folder = Path(run).resolve()
     ended = [
@@ -68,7 +69,7 @@ def to_tiled(run: Path | str, client: "Container") -> list[str]:
             writer(name, doc)
     if (folder / "result").is_dir():
         _delete([folder.name] if folder.name in client else [], client)
-        write_xarray_dataset(client, read_dataset(folder), key=folder.name)
+        write_xarray_dataset(client, dataset_of(read_result(folder)), key=folder.name)
     return missing
 
 

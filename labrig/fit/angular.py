@@ -79,7 +79,7 @@ def fit_dependence(
     if len(angles) < 2 or dof < 2:
         raise DataError(
             f"expected several views at each of two or more angles, got {len(signal)} views at "
-            f"{len(angles)}: the scatter cannot be told; go on with labrig resume"
+            f"{len(angles)}: the scatter cannot be estimated; go on with labrig resume"
         )
     value, noise = np.log(signal), np.asarray(sigma, np.float64) / signal
     scatter = _scatter(free, value, noise, dof)
@@ -383,7 +383,7 @@ def fit_shading(
     if len(images) < 3:
         raise DataError(
             f"expected three or more views of the sphere, got {len(images)}: the scatter cannot be "
-            "told; go on with labrig resume"
+            "estimated; go on with labrig resume"
         )
     views = [_View.of(image, light) for image in images]
     if all(view.is_even for view in views):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.special import chdtrc
 
 from labrig.foundation.errors import FitError
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.results import Measured
 
 #: Fewest different places that tell a slope and whether there is one.
@@ -16,7 +17,7 @@ FEWEST = 3
 
 
 @dataclass(frozen=True)
-class PowerLaw:
+class PowerLaw(NotebookViews):
     """Fitted power law y ∝ xⁿ.
 
     Attributes

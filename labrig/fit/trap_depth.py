@@ -66,8 +66,9 @@ def fit_trap_depth(
     )
     if not celsius.shape == rate.shape == sigma.shape or celsius.ndim != 1 or celsius.size < 2:
         raise FitError(
-            f"expected rates at two temperatures or more, got {celsius.size} temperatures and "
-            f"{rate.size} rates with {sigma.size} σ; measure the decay at another temperature"
+            "expected the rate and its σ at two temperatures or more, got "
+            f"{len(celsius)} of a temperature, {len(rate)} of a rate and {len(sigma)} of a σ; "
+            "measure the decay at another temperature, and name that run, too"
         )
     order = np.argsort(celsius, kind="stable")
     celsius, rate, sigma = celsius[order], rate[order], sigma[order]

@@ -28,7 +28,17 @@ class ProtocolError(UsageError):
 
 
 class MissingDeviceError(ProtocolError):
-    """A rig that lacks a device of the protocol."""
+    """A rig that lacks a device of the protocol.
+
+    Attributes
+    ----------
+    key
+        Key of the device under `devices:` of a rig file.
+    """
+
+    def __init__(self, message: str, key: str) -> None:
+        super().__init__(message)
+        self.key = key
 
 
 class DeviceError(LabrigError):

@@ -55,9 +55,13 @@ def parse(text: str, units: dict[str, float]) -> float:
     match = _PATTERN.fullmatch(text.translate(_LOOKALIKES))
     if match is None or match["unit"] not in units:
         example = next(unit for unit, factor in units.items() if factor == max(units.values()))
+        with_point = text.replace(",", ".", 1)
+        remedy = (
+            f"; write a decimal point: '{with_point}'" if _PATTERN.fullmatch(with_point) else ""
+        )
         raise ValueError(
             f"expected a number with a unit ({', '.join(units)}), such as '5 {example}', "
-            f"got '{text}'"
+            f"got '{text}'{remedy}"
         )
     divisor = float(match["divisor"] or 1)
     value = float(match["number"]) / divisor * units[match["unit"]] if divisor else math.inf

@@ -60,6 +60,8 @@ def find(place: str, kind: str, name_or_path: str | os.PathLike[str]) -> Path:
         return path
     shipped = names(place)
     if str(path) not in shipped:
+        if path.is_dir():
+            raise UsageError(f"{path}: expected a {kind} file, got a folder; name a file in it")
         if path.suffix:
             require_kind(path, *_KINDS[kind])
         suffix = next(iter(shipped.values())).suffix

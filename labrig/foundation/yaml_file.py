@@ -35,8 +35,9 @@ MAX_ALIASED = 100_000
 #: Letters of a text that count as one value more, where an alias repeats them.
 LETTERS_OF_VALUE = 50
 TOO_DEEP = f"nested more than {MAX_DEPTH} deep"
-#: Largest length of a text quoted in a message.
-MAX_SHOWN = 80
+#: Largest length of a text quoted in a message, and numbers of words that are suggested or listed.
+MAX_SHOWN, MAX_SUGGESTED, MAX_LISTED = 80, 4, 60
+_HOW_TO_BEGIN = "'labrig protocol new' and 'labrig rig new' write files to begin with"
 
 #: Characters that no name or path contains: NUL, and halves of surrogate pairs.
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
@@ -200,11 +201,18 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
         # Looking ahead for the end of a key, libyaml may meet a limit of its own first.
         problem = TOO_DEEP if "nesting depth" in mistake.text else mistake.text
         raise UsageError(f"{source}{place}: {problem}") from None
+    except yaml.reader.ReaderError:
+        raise UsageError(
+            f"{source}: not YAML (expected a text file, got characters that are no text)"
+        ) from None
     except (yaml.YAMLError, ValueError) as error:
         raise UsageError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
+    if content is None:
+        raise UsageError(f"{source}: expected 'key: value' lines, got nothing; {_HOW_TO_BEGIN}")
     if not isinstance(content, dict):
         raise UsageError(
-            f"{source}: expected 'key: value' lines, got {' '.join(_kind(content).split())}"
+            f"{source}: expected 'key: value' lines, got {' '.join(_kind(content).split())}; "
+            f"{_HOW_TO_BEGIN}"
         )
     return content
 
@@ -249,9 +257,21 @@ def validate(content: Mapping[str, Any], model: type[ModelT], source: str) -> Mo
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """Return a suggestion for a misspelt `word`, or the list of known words."""
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known))}"
+    """Return the known words that are closest to `word` or begin with it, or all of them."""
+    close = difflib.get_close_matches(word, known, n=MAX_SUGGESTED, cutoff=0.6)
+    if not close:
+        beginning = [each for each in sorted(known) if each.startswith(word)][:MAX_SUGGESTED]
+        if word and beginning:
+            return f"did you mean {' or '.join(map(repr, beginning))}?"
+        more = f", … ({len(known)} in all)" if len(known) > MAX_LISTED else ""
+        return f"known: {', '.join(sorted(known)[:MAX_LISTED])}{more}"
+    matcher = difflib.SequenceMatcher(b=word)
+    ratios = []
+    for each in close:
+        matcher.set_seq1(each)
+        ratios.append(matcher.ratio())
+    equal = [each for each, ratio in zip(close, ratios, strict=True) if ratio == max(ratios)]
+    return f"did you mean {' or '.join(map(repr, equal))}?"
 
 
 def _first_problem(
@@ -274,6 +294,8 @@ def _first_problem(
     alike = [each for each in problems if place(each, content) == where]
     shown = _example(model, where)
     message = in_unit_of(shown, refusal(problem, alike, unit_of(shown)), problem["input"])
+    if problem["type"] == "model_type":
+        message += f" with {', '.join(dict.fromkeys(_sibling_keys(model, (*where, ''))))}"
     # A rule of several keys names their values itself.
     names_values = is_rule(problem) and _is_block(problem["input"])
     received = "" if "got " in message or names_values else f", got {_kind(problem['input'])}"

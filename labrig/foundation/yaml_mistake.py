@@ -110,6 +110,8 @@ def explain(error: MarkedError, text: str) -> YamlMistake:
         column = error.problem_mark.column
         sign = lines[at][column : column + 1]
         return _at(at, f"no value begins with '{sign}'; write it in quotation marks")
+    if "another document" in problem:
+        return _at(at, "expected one document, got a second one after '---'; delete one of them")
     if "undefined alias" in problem:
         return _at(
             at, f"{problem}: '*' refers to what is marked by '&'; write a text in quotation marks"

@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.material.file import Material, State
 
 
@@ -39,7 +40,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class MaterialComparison:
+class MaterialComparison(NotebookViews):
     """All quantities that at least one of two materials has.
 
     Attributes
@@ -104,8 +105,8 @@ def compare_materials(measured: Material, reference: Material) -> MaterialCompar
         )
     if not all(state.is_level_known for state in (*measured_states, *reference_states)):
         notes.append(
-            "The charge of one of them was too far from saturation to tell k_r, r(0), k_e and Λ "
-            "apart; those are left out."
+            "The charge of one of them was too far from saturation to separate k_r, r(0), k_e "
+            "and Λ; they are left out."
         )
     has_order = not (measured.is_first_order and reference.is_first_order)
     if has_order:

@@ -19,6 +19,7 @@ from pydantic import (
 
 from labrig.foundation import resources
 from labrig.foundation.models import FrozenModel, NotNegative
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.yaml_file import model_text, read_model, write_yaml
 
 Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -367,7 +368,7 @@ class Provenance(FrozenModel):
     temperature_c: Annotated[float, Field(ge=-273.15, le=1000)] | None = None
 
 
-class Material(FrozenModel):
+class Material(FrozenModel, NotebookViews):
     """A phosphorescent material.
 
     Attributes

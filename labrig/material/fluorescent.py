@@ -9,12 +9,13 @@ from pydantic import Field
 
 from labrig.foundation.errors import UsageError
 from labrig.foundation.models import FrozenModel
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.material.file import Provenance
 from labrig.material.reradiation import ReradiationMatrix, read_reradiation, write_reradiation
 
 
-class FluorescentMaterial(FrozenModel):
+class FluorescentMaterial(FrozenModel, NotebookViews):
     """A fluorescent material.
 
     Attributes

@@ -298,7 +298,9 @@ def _spectrum(
         if is_light and axis.unit.is_reciprocal and ordinate.per != "nm":
             quantity = Quantity.OTHER_DENSITY
     if quantity is Quantity.UNKNOWN:
-        notes.append(f"what the values of column {place} are is not stated; they stay as they are")
+        notes.append(
+            f"the file does not state the quantity of column {place}; its values stay as they are"
+        )
     elif done:
         notes.append(f"column {place}: {done}")
     order = np.argsort(nm, kind="stable")

@@ -115,7 +115,9 @@ def read_axis(name: str, unit: str) -> tuple[bool, AxisUnit | None]:
     base, inner = _split(text)
     stated = axis_unit(unit) or axis_unit(inner)
     if base in _OTHER_AXES:
-        raise ValueError(f"expected an axis of wavelengths, got '{shown}'")
+        raise ValueError(
+            f"expected a column of wavelengths, got '{shown}'; call it wavelength_nm if it has them"
+        )
     if base not in _NAMES:
         return False, None
     if stated is not None:

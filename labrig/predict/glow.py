@@ -83,7 +83,7 @@ def check_states(material: Material) -> None:
     if len(rates) > MAX_STATES:
         raise UsageError(
             f"{material.name}: expected at most {MAX_STATES} states, got {len(rates)}; no decay "
-            "tells so many apart (such a list stands for a power law, which has no rates to "
+            "resolves so many (such a list stands for a power law, which has no rates to "
             "predict)"
         )
     if len(set(rates)) < len(rates):

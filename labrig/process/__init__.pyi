@@ -5,6 +5,8 @@ from .run import (
     draw_figures as draw_figures,
     process_and_report as process_and_report,
     process_run as process_run,
+    refit as refit,
+    rendered_result as rendered_result,
     restore_result as restore_result,
 )
 from .verification import (

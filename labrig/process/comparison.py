@@ -70,7 +70,7 @@ def include_comparison(run: Path, result: Path) -> bool:
         part = (
             '<section><h2>Rendered comparison</h2>\n<p class="text">The comparison with '
             "rendered pictures is of another result of this run. Make it again: "
-            f"<code>labrig compare {escape(run.name)} --rendered</code></p></section>"
+            f"<code>labrig reproduce {escape(run.name)} --rendered</code></p></section>"
         )
     page = with_later(read_text(report), part.strip())
     if page is None:

@@ -177,7 +177,7 @@ def _flattened(content: Mapping[str, Any], place: str) -> Iterator[tuple[str, st
 
 def _other_settings(before: Mapping[str, str], after: Mapping[str, str]) -> Iterator[str]:
     if not before:
-        yield "what the earlier one was made with is not recorded"
+        yield "the libraries of the earlier result are not recorded"
         return
     for key in dict.fromkeys([*before, *after]):
         old, new = before.get(key, "none"), after.get(key, "none")

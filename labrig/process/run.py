@@ -1,15 +1,24 @@
 """Processing of a run of any protocol, from its folder to result, report and exports."""
 
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
-from labrig.acquire import ProtocolModel, RigFile, result_takes_edits
+from labrig.acquire import (
+    EDITED,
+    ProtocolModel,
+    RigFile,
+    read_run_protocol,
+    result_takes_edits,
+)
 from labrig.analyse import (
     AnalysisContext,
     Inputs,
     Overrides,
+    analyse_part,
     check_options,
     clock_warnings,
     reference_of,
@@ -28,7 +37,7 @@ from labrig.foundation.result_warning import (
     Unmeasured,
     warning_lines,
 )
-from labrig.foundation.yaml_file import write_yaml
+from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
 from labrig.process.provenance import (
@@ -62,7 +71,14 @@ from labrig.report import (
     write_figures_pdf,
     write_report,
 )
-from labrig.results import SAMPLE_PICTURE, RunResult, read_result, write_result, write_summary
+from labrig.results import (
+    SAMPLE_PICTURE,
+    ChainResult,
+    RunResult,
+    read_result,
+    write_result,
+    write_summary,
+)
 
 _EARLIER = "result-"
 #: Exposure time in seconds below which a frame of a glow is mostly noise; for display only.
@@ -278,22 +294,7 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     overrides.check([file for attempt in run.completed().values() for file in attempt.files])
     require_recorded_settings(run, overrides.bench(folder), overrides)
-    analyse = measurement(protocol.protocol, str(folder)).load("analysis")
-    inputs = Inputs.of(rig)
-    part = AnalysisContext(run, protocol, rig, overrides, inputs)
-    result: RunResult = analyse(part)
-    lvf = inputs.updated_by(result)[LVF_KIND]
-    camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
-    warnings = (
-        *result.warnings,
-        *clock_warnings(run),
-        *unknown_camera,
-        *temperature_warnings(run, protocol.rate_frames),
-        *_clock_step_warnings(run),
-        *_unfinished_warnings(run, protocol),
-        *_edited_warnings(folder, overrides),
-    )
-    result = replace(result, warnings=warnings)
+    part, result, camera = _analysed(run, protocol, rig, overrides)
 
     about = describe_run(run, protocol, rig, edited=overrides.edited)
     result_folder = new_result(folder)
@@ -318,12 +319,136 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     page = folder / "result" / "report.html"
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
-    return Processed(result, page, rendered.lines, changes, not_kept)
+    return Processed(result.of_run(folder), page, rendered.lines, changes, not_kept)
 
 
 def _dimness(frame: FrameRecord) -> tuple[bool, float]:
     """Return a rank: metered frames are the shorter, the brighter it is; brief ones are noisy."""
     return frame.exposure_s < BRIEF_S, frame.exposure_s * frame.iso
+
+
+def _analysed(
+    run: RunRecord, protocol: ProtocolModel, rig: RigFile, overrides: Overrides
+) -> tuple[AnalysisContext, RunResult, CameraResponse | None]:
+    """Return what was analysed, the result with all its warnings, and the camera's curves."""
+    analyse = measurement(protocol.protocol, str(run.folder)).load("analysis")
+    inputs = Inputs.of(rig)
+    part = AnalysisContext(run, protocol, rig, overrides, inputs)
+    result: RunResult = analyse(part)
+    lvf = inputs.updated_by(result)[LVF_KIND]
+    camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
+    warnings = (
+        *result.warnings,
+        *clock_warnings(run),
+        *unknown_camera,
+        *temperature_warnings(run, protocol.rate_frames),
+        *_clock_step_warnings(run),
+        *_unfinished_warnings(run, protocol),
+        *_edited_warnings(run.folder, overrides),
+    )
+    return part, replace(result, warnings=warnings), camera
+
+
+def refit(result: RunResult, options: Mapping[str, Any]) -> RunResult:
+    """Return the result of a run with other options of its measurement, and write nothing.
+
+    Parameters
+    ----------
+    result
+        Result by `read_result` or `process_run`, or that of a part of a chain.
+    options
+        The measurement's own options by name, such as `states` of a decay.
+
+    Returns
+    -------
+    RunResult
+        Result of the same frames, regions and calibrations.
+
+    Raises
+    ------
+    UsageError
+        The result belongs to no run folder, the measurement has no such option, or another labrig
+        is processing the run.
+    FitError
+        Nothing can be fitted.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.process import refit
+    >>> one = refit(labrig.read_result("runs/decay"), {"states": 1})
+    >>> [f"{rate.value:.4f}" for rate in one.patches["sample"].fit.rates]
+    ['0.0183']
+    """
+    folder = _folder_of(result)
+    made = read_model(folder / "result" / PROVENANCE, Provenance)
+    is_edited = EDITED in made.given
+    protocol = read_run_protocol(folder, edited=is_edited)
+    regions = made.regions if hasattr(protocol, "patches") else {}
+    overrides = Overrides(
+        regions, frozenset(made.excluded), None, made.optics, options, edited=is_edited
+    )
+    check_options(options, protocol)
+    with RunLock(folder / LOCK, "processing this run"):
+        run = read_run(folder)
+        rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
+        if not result.run_part:
+            return _analysed(run, protocol, rig, overrides)[1].of_run(folder)
+        whole = read_result(folder)
+        assert isinstance(whole, ChainResult), "only a chain has parts"
+        chain = AnalysisContext(run, protocol, rig, overrides, Inputs.of(rig))
+        refitted = analyse_part(chain, result.run_part, whole.parts)
+    return refitted.of_run(folder, result.run_part)
+
+
+def _folder_of(result: RunResult) -> Path:
+    if result.run_folder is None:
+        raise UsageError(
+            f"expected the result of a run, got one of '{result.kind}' that belongs to no run "
+            "folder; read it with labrig.read_result"
+        )
+    return result.run_folder
+
+
+def rendered_result(result: RunResult) -> Rendered:
+    """Return the sections of a run's report, made of its result.
+
+    Parameters
+    ----------
+    result
+        Result by `read_result` or `process_run`, or that of a part of a chain.
+
+    Returns
+    -------
+    Rendered
+        Sections as in the report, whose figures are not yet drawn.
+
+    Raises
+    ------
+    UsageError
+        The result belongs to no run folder.
+    DataError
+        The run's folder was changed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.process import rendered_result
+    >>> sections = rendered_result(labrig.read_result("runs/decay")).sections
+    >>> [section.title for section in sections][:2]
+    ['Results', 'Sample']
+    """
+    folder = _folder_of(result)
+    overrides = Overrides(edited=result_takes_edits(folder))
+    run, protocol = read_run(folder), overrides.protocol(folder)
+    rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
+    camera, _ = _camera_response(rig, None, Inputs.of(rig).updated_by(result)[LVF_KIND])
+    about = describe_run(run, protocol, rig, edited=overrides.edited)
+    source = Source(run, protocol, rig, about, camera)
+    if not result.run_part:
+        return _render(result, source)
+    link = next(link for link in protocol.chain() if link.name == result.run_part)
+    return render(result, replace(source, run=run.part(link.name), protocol=link.protocol))
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:
@@ -360,13 +485,10 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     ('runs/decay/result/figures/figures.pdf', 8)
     """
     folder = Path(folder)
-    overrides = Overrides(edited=result_takes_edits(folder))
-    run, protocol, result = read_run(folder), overrides.protocol(folder), read_result(folder)
-    rig = overrides.bench(folder)
-    source = Source(run, protocol, rig, describe_run(run, protocol, rig, edited=overrides.edited))
+    result, run = read_result(folder), read_run(folder)
     path = path or folder / "result" / "figures" / "figures.pdf"
-    title = f"{source.about.title}, {source.about.run}"
-    n_pages = write_figures_pdf(path, title, _render(result, source).sections)
+    title = f"{read_run_protocol(folder).sample.name}, {run.name}"
+    n_pages = write_figures_pdf(path, title, rendered_result(result).sections)
     if not n_pages:
         raise UsageError(f"{folder}: expected a report with figures, it has none")
     return path, n_pages

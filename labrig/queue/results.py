@@ -333,7 +333,7 @@ def queue_report(name: str, listed: Sequence[QueueEntry], folder: Path = Path())
         row for key, _, _, points in luminous for row in _slopes("Luminance", key, points, scale)
     ]
     tables = (Table(SLOPE_HEAD, tuple(slopes), SLOPES),) if slopes else ()
-    swept = (Section("Over what was changed", figures=figures, tables=tables),) if figures else ()
+    swept = (Section("Over the changed keys", figures=figures, tables=tables),) if figures else ()
     about = describe_without_run(name, "queue", "", ())
     warnings = [
         warning.about(f"no. {entry.number}") for entry in listed for warning in entry.warnings

@@ -47,8 +47,8 @@ def require_plain_folder(folder: Path) -> None:
                     elif not entry.is_file(follow_symlinks=False):
                         raise DataError(
                             f"{entry.path}: expected files and folders alone in a run, got "
-                            f"{_kind(entry)}, which may lead elsewhere; delete it, or put in its "
-                            "place what it leads to"
+                            f"{_kind(entry)}, which may lead elsewhere; delete it, or "
+                            "replace it by the file or folder to which it leads"
                         )
         except OSError:
             continue  # what cannot be listed is named where it is used

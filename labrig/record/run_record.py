@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from labrig.foundation.errors import DataError
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.record.frames import (
     UNDONE,
     ActionRecord,
@@ -88,7 +89,7 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class RunRecord:
+class RunRecord(NotebookViews):
     """Content of the journal of a run.
 
     Attributes
@@ -115,6 +116,33 @@ class RunRecord:
     def name(self) -> str:
         """Name of the run folder, with links resolved; bytes that are not UTF-8 are replaced."""
         return os.fsencode(self.folder.resolve().name).decode(errors="replace")
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return frames, actions and temperatures of completed units; times are since 1970."""
+        attempts = self.completed().values()
+        frames = [
+            (
+                *(frame.path.name, frame.role, frame.unit, frame.start_time, frame.exposure_s),
+                *(frame.iso, "" if frame.f_number is None else frame.f_number, frame.late_s),
+            )
+            for attempt in attempts
+            for frame in attempt.frames
+        ]
+        actions = [
+            (act.unit, act.device, act.action, act.start_time, act.end_time, act.late_s)
+            for attempt in attempts
+            for act in attempt.actions
+        ]
+        of_frame = ("start_time_s", "exposure_s", "iso", "f_number", "late_s")
+        of_action = ("start_time_s", "end_time_s", "late_s")
+        tables = {
+            "frames.csv": CsvTable(("frame", "role", "unit", *of_frame), frames),
+            "actions.csv": CsvTable(("unit", "device", "action", *of_action), actions),
+        }
+        if readings := self.temperatures():
+            rows = [(reading.time, reading.temperature_c) for reading in readings]
+            tables["temperatures.csv"] = CsvTable(("time_s", "temperature_c"), rows)
+        return tables
 
     @property
     def camera_identity(self) -> str:

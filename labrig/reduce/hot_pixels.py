@@ -153,7 +153,8 @@ def hot_pixels_of(darks: Sequence[Exposure]) -> HotPixels | None:
 def _bright_in_several(darks: Sequence[BrightPlaces]) -> HotPixels:
     if len(darks) < HOT_FRAMES:
         raise DataError(
-            f"expected {HOT_FRAMES} or more dark frames to tell hot pixels from cosmic rays, got "
+            f"expected {HOT_FRAMES} or more dark frames to separate hot pixels from cosmic rays, "
+            "got "
             f"{len(darks)}; take more"
         )
     kinds = {dark.kind for dark in darks}

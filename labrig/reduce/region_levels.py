@@ -308,7 +308,7 @@ def _uncut(plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: flo
     if lowest > TOO_MANY * n > 0:
         raise FrameError(
             f"{lowest / n:.1%} of the {plane.colour} pixels are cut off at black, so that their "
-            "level cannot be told: the camera subtracts more than its black level; raise its "
+            "level cannot be estimated: the camera subtracts more than its black level; raise its "
             "black level (offset, brightness) if it has such a setting, or take another camera"
         )
     mean = float(plane.value @ plane.count) / max(n, 1.0) + black_dn

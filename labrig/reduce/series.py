@@ -380,7 +380,7 @@ def _patch_levels(
             if view.is_cut_off and not patch_dark.is_cut_off:
                 raise DataError(
                     f"{entry.frame.path}: the camera cuts off noise below black here, and the dark "
-                    "frames have none to tell their level by: it subtracts more than its black "
+                    "frames have no noise that shows their level: it subtracts more than its black "
                     "level, or they are of another camera; raise its black level (offset), or take "
                     "the dark frames again"
                 )

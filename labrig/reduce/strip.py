@@ -133,7 +133,7 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
         )
     if not FULL[0] < np.count_nonzero(lit_mask) / (across * down) < FULL[1]:
         raise DataError(
-            "what is lit is no rectangle; keep other light away and the holder round the filter "
+            "the lit area is no rectangle; keep other light away and the holder round the filter "
             "dark"
         )
     along = np.array([np.cos(np.radians(angle)), np.sin(np.radians(angle))])

@@ -1,11 +1,13 @@
 from .charge import (
     charge_report as charge_report,
 )
+from .chart import Chart as Chart
 from .colours import (
     camera_to_xyz as camera_to_xyz,
     css_colour as css_colour,
     into_gamut as into_gamut,
 )
+from .columns_figure import columns_pictures as columns_pictures
 from .curve_sketch import (
     describe_curves as describe_curves,
     describe_shipped_curves as describe_shipped_curves,
@@ -14,6 +16,7 @@ from .curve_sketch import (
 from .decay_figures import (
     exposure_middles_s as exposure_middles_s,
 )
+from .described import sections_of as sections_of
 from .design import (
     describe_design as describe_design,
     describe_energy as describe_energy,
@@ -59,6 +62,10 @@ from .mixture import (
     difference_lines as difference_lines,
 )
 from .mixture_page import mixture_report as mixture_report
+from .notebook_page import (
+    NotebookPage as NotebookPage,
+    notebook_html as notebook_html,
+)
 from .page import (
     Report as Report,
     section_page as section_page,

@@ -123,7 +123,8 @@ def _methods(fit: ChargeFit) -> Section:
     points = (
         "Each state obeys dr/dt = (1 − r) κ − k rᵇ and emits Λ (k rᵇ + η κ r) under the lamp, "
         "Λ k rᵇ in the dark (May and Partridge, J. Chem. Phys. 40, 1964).",
-        "Readings while the lamp switches are left out; those before it tell the dark level.",
+        "Readings while the lamp switches are left out; readings before the lamp determine the "
+        "dark level.",
         *(
             (
                 "Sums of neighbouring residuals exceed noise: every σ is multiplied by "
@@ -143,7 +144,7 @@ def _figures(fit: ChargeFit) -> Section:
     caption = (
         f"{'Means of neighbouring readings' if averaged else 'Readings'} with ± 1 σ and the fit, "
         "dark level included. Below: their distance from the fit in σ; within the shade are 95 % "
-        "if the model is right; what lies further off than 10 σ is at the edge."
+        "if the model is right; readings further off than 10 σ are at the edge."
     )
     charge = _chart(fit, fit.readings.t_s, lit, is_logarithmic=False)
     decay = _chart(fit, after_s, ~lit, is_logarithmic=True)

@@ -200,9 +200,9 @@ def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> "Figure":
     >>> [round(72 * inches) for inches in figure.get_size_inches()]
     [420, 200]
     """
-    from matplotlib.figure import Figure
+    from labrig.report.notebook_figure import NotebookFigure  # matplotlib is slow to load
 
-    figure = Figure(figsize=(width_pt / 72, height_pt / 72), dpi=72)
+    figure = NotebookFigure(figsize=(width_pt / 72, height_pt / 72), dpi=72)
     figure.patch.set_visible(False)
     return figure
 

@@ -269,7 +269,7 @@ def _methods(compared: ComparedLeds) -> Section:
         "colours are compared with those of the measured matrix.",
         "'recommended' are the sets that a search found over 44 measured matrices; 'even' ones are "
         "evenly spaced from 380 nm to 640 nm.",
-        "An LED excites only what takes in light of its wavelength: without an ultraviolet LED, "
+        "An LED excites only dyes that absorb its wavelength: without an ultraviolet LED, "
         "colours under ultraviolet light are extrapolated.",
     )
     return Section("How it was found", points=points)

@@ -49,7 +49,7 @@ def measured_table(material: Material) -> Table:
         )
     if not all(state.is_level_known for state in states):
         caption += (
-            " The charge was too far from saturation to tell k_r, r(0), k_e and Λ apart: those are "
+            " The charge was too far from saturation to separate k_r, r(0), k_e and Λ: they are "
             "left out, though the file has values for predictions, good for charges like this one."
         )
     return Table(head if len(states) > 1 else ("", "measured"), rows, caption)

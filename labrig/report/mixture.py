@@ -182,7 +182,7 @@ def threshold_text(fit: MixtureFit) -> str:
     rate = (
         "given"
         if fit.false_discovery_rate is None
-        else f"{100 * fit.false_discovery_rate:g} % of what is kept is noise"
+        else f"{100 * fit.false_discovery_rate:g} % of the kept numbers are noise"
     )
     return (
         f"{rounded(fit.threshold, 3)} per band, {rate}; {fit.kept_entries} of {fit.entries} "

@@ -35,7 +35,7 @@ from labrig.report.sections import Section, Table
 #: Sentences on the scale, by `MixtureFit.scaling`.
 SCALINGS = {
     "integral": "The scale keeps the light of all numbers, where σ is known as far as their sum "
-    "tells it better than the fit; else of those above the threshold.",
+    "determines it better than the fit does; else of the numbers above the threshold.",
     "least-squares": "The scale makes the mean squared error least.",
     "colour": "The scale makes the mean ΔE2000 under {lights} least.",
 }
@@ -119,7 +119,7 @@ def _mixture(fitted: FittedMatrix) -> Section:
 def _error(fit: MixtureFit) -> str:
     if fit.reduced_chi2 is None:
         return f"The mean squared error is {rounded(fit.masked_mse, 3)} per band²."
-    return f"Reduced χ² is {rounded(fit.reduced_chi2, 3)}: what is above 1 is misfit, not noise."
+    return f"Reduced χ² is {rounded(fit.reduced_chi2, 3)}: the part above 1 is misfit, not noise."
 
 
 def _verb(components: int) -> str:
@@ -217,10 +217,10 @@ def _methods(fitted: FittedMatrix) -> Section:
         f"{rounded(fit.likelihood_mse, 3)} per band².",
         f"Then least squares, {fit.refinement_iterations} iterations"
         + (
-            ": likelihood is not the error that is told."
+            ": the stated error is not the likelihood."
             if fit.reduced_chi2 is None
-            else ", of all numbers as they were measured, weighted by σ: what a threshold takes "
-            "for noise is partly light."
+            else ", of all numbers as they were measured, weighted by σ: numbers below a "
+            "threshold are partly light."
         ),
         *(
             ()

@@ -9,8 +9,8 @@ from labrig.results import FittedDecay, NoiseBudget, Series
 
 #: Assumptions of every decay measured with a camera.
 DECAY_ASSUMPTIONS = (
-    "The amplitudes aᵢ are what the decay measures: the signal at lamp off in the brightest "
-    "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiation Λᵢ "
+    "The amplitudes aᵢ are measured: they are the signal at lamp off in the brightest channel, "
+    "extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiation Λᵢ "
     "and concentration rᵢ(0) are not determined separately by a decay alone.",
     "A frame measures the mean over its exposure, and is fitted as such.",
     "Rates and amplitudes are shared by the channels; each channel has one weight. So every state "
@@ -25,7 +25,7 @@ DECAY_ASSUMPTIONS = (
 #: Assumptions of a decay from another program's table.
 TABLE_ASSUMPTIONS = (
     "The amplitudes aᵢ are the signal at lamp off in the unit of the table, extrapolated. Where "
-    "the table's clock tells nothing of lamp off, they are those at the first row, from which all "
+    "the table's clock does not include lamp off, they are those at the first row, from which all "
     "times count here, and laws that are no sum of exponentials are taken to begin there.",
     "Times and values are as they stand in the table; where it has no exposures, a value is taken "
     "to be momentary.",

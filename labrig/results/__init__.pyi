@@ -119,12 +119,21 @@ from .luminance import (
     luminance_unit as luminance_unit,
 )
 from .measured import (
+    ONLY as ONLY,
     Measured as Measured,
     OneSided as OneSided,
     field_unit as field_unit,
     iter_values as iter_values,
     measured_number as measured_number,
     with_uncertainty as with_uncertainty,
+)
+from .quantities import (
+    SIGMA as SIGMA,
+    Quantity as Quantity,
+    Units as Units,
+    coordinates_by_length as coordinates_by_length,
+    iter_quantities as iter_quantities,
+    number_array as number_array,
 )
 from .run_result import (
     AnyResult as AnyResult,

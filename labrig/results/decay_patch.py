@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.foundation.output_file import make_folder
 from labrig.foundation.region import Region
 from labrig.material import Material, write_material
@@ -15,8 +16,8 @@ from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_decay_file import write_fitted_decay
 from labrig.results.fitted_law import EXPONENTIALS
 from labrig.results.measured import Measured
-from labrig.results.run_result import RunResult
-from labrig.results.series import Series, write_series
+from labrig.results.run_result import RunResult, in_folders
+from labrig.results.series import Series
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class NoiseBudget:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class DecayPatch:
+class DecayPatch(NotebookViews):
     """Decay of one patch of the sample.
 
     Attributes
@@ -126,10 +127,13 @@ class DecayPatch:
                     ),
                 )
 
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `series.csv`."""
+        return self.series.csv_tables()
+
     def write_files(self, folder: Path) -> None:
-        """Write `series.csv` and, where there is a fit, `fit.json` and `material.yaml`."""
+        """Write, where there is a fit, `fit.json` and `material.yaml`."""
         make_folder(folder)
-        write_series(folder / "series.csv", [self.series])
         if self.fit is not None:
             write_fitted_decay(folder / "fit.json", self.fit)
         if self.material is not None:
@@ -169,6 +173,11 @@ class ResultWithDecays(RunResult):
     def failures(self) -> tuple[str, ...]:
         """Return the reasons why no patch at all could be fitted."""
         return () if self.fits else tuple(patch.failure for patch in self.patches.values())
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table of each patch; of several patches, each in a folder of its name."""
+        tables = {name: patch.csv_tables() for name, patch in self.patches.items()}
+        return in_folders(tables) if len(tables) > 1 else next(iter(tables.values()), {})
 
     def write_files(self, folder: Path) -> None:
         """Write the files of each patch; of several patches, each into a folder of its name."""

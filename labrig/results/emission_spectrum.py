@@ -12,11 +12,11 @@ from scipy.interpolate import CubicSpline
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.models import Finite, FrozenModel, NotNegative
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.material import Spectrum
 from labrig.optics import band_means, edges_from_centres
 from labrig.results.measured import Measured
-from labrig.results.text_files import write_csv
 
 #: Grid of wavelengths in nm, from section 4.7 of the paper (Nalbach et al.).
 WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)
@@ -92,7 +92,7 @@ class SpectralComparison:
     shift_nm_sigma: float
 
 
-class EmissionSpectrum(FrozenModel):
+class EmissionSpectrum(FrozenModel, NotebookViews):
     """Emission spectrum Λ* on a grid, normalised to a maximum of 1.
 
     Attributes
@@ -217,11 +217,12 @@ class EmissionSpectrum(FrozenModel):
         """Return the spectrum in the form of a material file."""
         return Spectrum(wavelength_nm=self.wavelength_nm, value=self.value, sigma=self.sigma)
 
-    def write_csv(self, path: Path) -> None:
-        """Write the columns of the grid as a table."""
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the columns of the grid as `spectrum.csv`."""
         columns = (self.wavelength_nm, self.value, self.sigma, self.low, self.high)
         rows = ([f"{number:.6g}" for number in row] for row in zip(*columns, strict=True))
-        write_csv(path, ["wavelength_nm", "value", "sigma", "low", "high"], rows)
+        head = ("wavelength_nm", "value", "value_sigma", "low", "high")
+        return {"spectrum.csv": CsvTable(head, rows)}
 
 
 def read_emission_spectrum(path: Path) -> EmissionSpectrum:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, FitError
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.number_format import aligned, rounded
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.material import exponential_means_and_slopes
@@ -32,8 +32,6 @@ from labrig.results.text_files import finite, json_text
 FORECAST_SPANS = 3.0
 #: Reduced χ² of a law, in that of the best one, up to which it is in the bracket of a forecast.
 BRACKET_CHI2 = 4.0
-#: Width of a line for people.
-LINE_WIDTH = 100
 #: Relative difference below which the σ of all values is given as one.
 _SAME_SIGMA = 0.05
 #: Change of a rate in σ from which what it would be due to is worth a word.
@@ -203,7 +201,7 @@ def recommended_sampling(lifetime_s: float) -> str:
 
 
 @dataclass(frozen=True)
-class FittedDecay:
+class FittedDecay(NotebookViews):
     """Decay model Σ_i a_i e^(−k_i t), times a weight and plus an offset for each channel.
 
     Attributes
@@ -676,20 +674,18 @@ class FittedDecay:
             )
             lines.append(f"flicker  {percent} %{'' if self.flicker_sigma else ' (held)'}")
         if self.scatter is not None or self.sigma_origin:
-            origin = f"σ        {self.scatter or f'of {self.sigma_origin}'}"
-            lines += wrap(origin, LINE_WIDTH, subsequent_indent=" " * 9)
+            lines.append(f"σ        {self.scatter or f'of {self.sigma_origin}'}")
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         if self.other_laws:
-            lines += aligned([["law (* taken)", "", "reduced χ²", "BIC"], *self._law_rows()])
+            lines += aligned([["law (* taken)", "reduced χ²", "BIC", ""], *self._law_rows()])
             if self.compared_laws[0].name != self.law:
-                why = (
+                lines.append(
                     f"{LAW_LABELS[self.compared_laws[0].name]} has the lowest BIC and is not "
                     "taken: a law replaces another one where its BIC is lower by a margin, or it "
                     "was asked for"
                 )
-                lines += wrap(why, LINE_WIDTH)
         for outside in filter(None, (self.outside_sigma, str(self.unseen_flicker or ""))):
-            lines += wrap(f"not in σ {outside}", LINE_WIDTH, subsequent_indent=" " * 9)
+            lines.append(f"not in σ {outside}")
         return "\n".join(lines)
 
     def _law_rows(self) -> list[list[str]]:
@@ -697,9 +693,9 @@ class FittedDecay:
         return [
             [
                 f"{LAW_LABELS[law.name]}{' *' if law.name == self.law else ''}",
-                law.formula,
                 f"{law.reduced_chi2:.3g}",
                 f"+{law.bic_above_best:.1f}" if law.bic_above_best else "best",
+                law.formula,
             ]
             for law in self.compared_laws
         ]

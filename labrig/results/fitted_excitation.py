@@ -8,6 +8,7 @@ import numpy as np
 
 from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
 from labrig.foundation.detection import RATE_LIMIT_SIGMA
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.number_format import rounded
 from labrig.foundation.result_warning import ResultWarning
 from labrig.material import MAX_ORDER
@@ -271,7 +272,7 @@ class BandTests:
 
 
 @dataclass(frozen=True, eq=False)
-class FittedExcitation:
+class FittedExcitation(NotebookViews):
     """Rates of all states and bands, from all series together.
 
     Attributes

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 
 from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.material import ReradiationMatrix, ReradiationMixture
 from labrig.results.measured import Measured
 
@@ -230,7 +231,7 @@ class ColourUnderLight:
 
 
 @dataclass(frozen=True, eq=False)
-class FluorescentPatch:
+class FluorescentPatch(NotebookViews):
     """A sample under every LED, and its matrix.
 
     Attributes

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.number_format import aligned
 from labrig.foundation.quantity import TIME_S, duration_text, parse
 from labrig.foundation.result_warning import ResultWarning, warning_lines
@@ -202,7 +203,7 @@ class ForecastTime:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LuminanceDecay:
+class LuminanceDecay(NotebookViews):
     """Luminance of an afterglow, from its readings.
 
     Attributes

@@ -231,6 +231,7 @@ _UNITS = {
     "_dn_per_s": "DN/s",
     "_per_s": "1/s",
     "_nm": "nm",
+    "_deg": "deg",
     "_dn": "DN",
     "_px": "pixel",
     "_ms": "ms",

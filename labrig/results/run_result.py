@@ -4,18 +4,20 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.input_file import MAX_JSON_BYTES, read_text
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.foundation.output_file import make_folder_in, write_text
 from labrig.foundation.plugins import measurement
 from labrig.foundation.result_warning import ResultWarning, as_warnings
-from labrig.results.text_files import finite
+from labrig.results.text_files import finite, write_csv
 
 if TYPE_CHECKING:
     from labrig.results.budget import Budget
@@ -24,7 +26,7 @@ FILE = "result.json"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RunResult:
+class RunResult(NotebookViews):
     """Result of one protocol's analysis.
 
     A result holds numbers, with units in the names of its fields or in a `Measured`; arrays are
@@ -44,6 +46,9 @@ class RunResult:
 
     kind: ClassVar[str]
     schema_version: ClassVar[int] = 1
+    #: Run folder to which the result belongs, and its part of a chain's run; set by `of_run`.
+    run_folder: ClassVar[Path | None] = None
+    run_part: ClassVar[str] = ""
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(
         arbitrary_types_allowed=True, extra="forbid", ser_json_inf_nan="strings"
     )
@@ -71,11 +76,43 @@ class RunResult:
     def write_files(self, folder: Path) -> None:
         """Write the files for later runs and other programs into a folder, such as a material file.
 
+        Those of `csv_tables` are written beside them.
+
         Raises
         ------
         DiskError
             A file cannot be written.
         """
+
+    def of_run(self, folder: Path, part: str = "") -> Self:
+        """Note the run folder to which the result belongs, and its part of a chain's run.
+
+        A notebook shows it by the frames and the protocol that are there, and fits it anew.
+        """
+        object.__setattr__(self, "run_folder", Path(folder).absolute())
+        object.__setattr__(self, "run_part", part)
+        return self
+
+    def refit(self, **options: Any) -> Self:
+        """Return the result with other options of its measurement; nothing is written.
+
+        The regions, excluded frames and calibrations are those of this result.
+
+        Parameters
+        ----------
+        options
+            Options of `labrig process` for this measurement, such as `states` and `law` of a decay,
+            `order` of excitation, `method` of fluorescence under LEDs.
+
+        Raises
+        ------
+        UsageError
+            The result belongs to no run folder, or the measurement has no such option.
+        FitError
+            Nothing can be fitted.
+        """
+        refitted: Self = resolve_name("labrig.process:refit")(self, options)
+        return refitted
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of `result.json`, in which infinity and NaN are texts."""
@@ -121,6 +158,15 @@ class RunResult:
         own_type: Any = cls
         read: Self = _adapter(own_type).validate_python(fields)
         return read
+
+
+def in_folders(tables: Mapping[str, Mapping[str, CsvTable]]) -> dict[str, CsvTable]:
+    """Return the tables of several patches or parts, each in a folder of its name."""
+    return {
+        f"{folder}/{file}" if folder else file: table
+        for folder, files in tables.items()
+        for file, table in files.items()
+    }
 
 
 @cache
@@ -172,6 +218,10 @@ def write_result(folder: Path, result: RunResult) -> None:
     ['fit.json', 'material.yaml', 'result.json', 'series.csv']
     """
     write_text(folder / FILE, result.to_json())
+    for name, table in result.csv_tables().items():
+        *inner, file = name.split("/")
+        path = reduce(make_folder_in, inner, folder) / file
+        write_csv(path, table.head, table.rows, table.comments)
     result.write_files(folder)
 
 
@@ -213,7 +263,7 @@ def read_result(run: Path | str) -> RunResult:
             f"{place}: expected a run with a result; make it with: labrig process {place}"
         )
     try:
-        return _to_own_type(json.loads(read_text(path, MAX_JSON_BYTES)))
+        result = _to_own_type(json.loads(read_text(path, MAX_JSON_BYTES)))
     except (
         LabrigError, ValueError, KeyError, TypeError, AttributeError, RecursionError
     ) as error:  # fmt: skip
@@ -221,6 +271,7 @@ def read_result(run: Path | str) -> RunResult:
             f"{path}: expected a result as this labrig writes it, got something else "
             f"({_first_error(error)}); make it again: labrig process {place}"
         ) from None
+    return result.of_run(path.absolute().parents[1])
 
 
 def _first_error(error: Exception) -> str:
@@ -251,6 +302,12 @@ class ChainResult(RunResult):
     parts: Mapping[str, AnyResult]
     failed: Mapping[str, str]
 
+    def of_run(self, folder: Path, part: str = "") -> Self:
+        """Note the run folder to which the results of all parts belong."""
+        for name, result in self.parts.items():
+            result.of_run(folder, name)
+        return super().of_run(folder, part)
+
     def provides(self) -> dict[str, Any]:
         """Return the values that all parts provide; the later part has priority."""
         provided: dict[str, Any] = {}
@@ -259,6 +316,10 @@ class ChainResult(RunResult):
                 by_patch = isinstance(value, Mapping)
                 provided[name] = {**provided.get(name, {}), **value} if by_patch else value
         return provided
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the tables of every part, in a folder of its name."""
+        return in_folders({name: part.csv_tables() for name, part in self.parts.items()})
 
     def write_files(self, folder: Path) -> None:
         """Write the files of every part into a folder of its name."""

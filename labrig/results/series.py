@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.foundation.result_warning import ResultWarning
 from labrig.results.table_clock import TableClock
 from labrig.results.text_files import write_csv
@@ -24,7 +25,7 @@ LARGEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class Series(NotebookViews):
     """Values of one patch over n frames and C channels.
 
     Parameters
@@ -124,9 +125,9 @@ class Series:
         units = np.array(self.unit)
         return [self.take(np.flatnonzero(units == unit)) for unit in dict.fromkeys(self.unit)]
 
-    def write_csv(self, path: Path) -> None:
-        """Write series.csv; `read_series` reads the same numbers back."""
-        write_series(path, [self])
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `series.csv`; `read_series` reads the same numbers back."""
+        return {"series.csv": _table([self])}
 
 
 def write_series(path: Path, series: Sequence[Series]) -> None:
@@ -158,6 +159,11 @@ def write_series(path: Path, series: Sequence[Series]) -> None:
     >>> [series.region for series in labrig.read_series("two-patches.csv")]
     ['sample', 'right']
     """
+    table = _table(series)
+    write_csv(path, table.head, table.rows)
+
+
+def _table(series: Sequence[Series]) -> CsvTable:
     channels = {(part.channels, part.value_unit) for part in series}
     if len(channels) != 1:
         raise DataError(f"expected series of the same channels and unit, got {sorted(channels)}")
@@ -167,7 +173,7 @@ def write_series(path: Path, series: Sequence[Series]) -> None:
         column for name in names for column in (name + in_unit, name + SIGMA_SUFFIX + in_unit)
     ]
     rows = (row for part in series for row in _rows(part))
-    write_csv(path, (TIME, EXPOSURE, *columns, *RESERVED), rows)
+    return CsvTable((TIME, EXPOSURE, *columns, *RESERVED), rows)
 
 
 def _rows(series: Series) -> Iterator[list[str]]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.number_format import aligned
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.material import exponential_means
@@ -67,7 +68,7 @@ class TableDecay:
 
 
 @dataclass(frozen=True, eq=False)
-class SharedDecay:
+class SharedDecay(NotebookViews):
     """Decays of several tables with the same rates.
 
     Attributes

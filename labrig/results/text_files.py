@@ -9,8 +9,13 @@ from typing import Any
 from labrig.foundation.output_file import write_text
 
 
-def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a table whose first line names the columns.
+def write_csv(
+    path: Path,
+    head: Sequence[str],
+    rows: Iterable[Sequence[Any]],
+    comments: Iterable[str] = (),
+) -> None:
+    """Write a table whose first line after the comments names the columns.
 
     Parameters
     ----------
@@ -20,6 +25,8 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
         Names of the columns.
     rows
         Cells of each row; numbers are written with as many digits as their text has.
+    comments
+        Lines above the table, each of which begins with `#`.
 
     Raises
     ------
@@ -37,7 +44,7 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
     # Not above: it loads NumPy, and who lists runs needs none.
     from labrig.text_table import table_text
 
-    write_text(path, table_text(head, rows))
+    write_text(path, table_text(head, rows, comments))
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

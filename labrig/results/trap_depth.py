@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.number_format import aligned, rounded
 from labrig.foundation.quantity import BOLTZMANN_EV_PER_K, ZERO_C_K
 from labrig.foundation.result_warning import ResultWarning, warning_lines
@@ -16,7 +17,7 @@ from labrig.results.text_files import finite, json_text
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TrapDepth:
+class TrapDepth(NotebookViews):
     """Arrhenius' law k = s exp(−E / k_B T) of a state of first order, with its measured rates.
 
     Attributes

@@ -2,17 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.foundation.region import Region
 from labrig.optics import Spectrum
 from labrig.results.budget import Budget
 from labrig.results.fluorescent_patch import MatrixOnBands
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
 
 #: Whether the photographs are as predicted.
 Verdict = Literal["agrees", "differs"]
@@ -182,24 +181,22 @@ class PredictedUnderLamps(RunResult):
             for name, patch in comparison.patches.items()
         }
 
-    def write_files(self, folder: Path) -> None:
-        """Write a table of values and colours."""
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return a table of values and colours, `illuminants.csv`."""
         head = [f"{what}_{k}" for what in ("value", "predicted", "pull") for k in self.channels]
         labs = [f"{what}_{axis}" for what in ("measured", "predicted") for axis in "Lab"]
-        write_csv(
-            folder / "illuminants.csv",
-            ("lamp", "patch", *head, *labs, "delta_e", "delta_e_sigma", "delta_e_reflected"),
+        rows = (
             (
-                (
-                    lamp,
-                    name,
-                    *(f"{number:.6g}" for number in (*patch.value, *patch.predicted, *patch.pull)),
-                    *(f"{number:.4f}" for number in (*patch.measured.lab, *patch.whole.lab)),
-                    f"{patch.delta_e.value:.4f}",
-                    f"{patch.delta_e.sigma:.4f}",
-                    f"{patch.delta_e_reflected.value:.4f}",
-                )
-                for lamp, comparison in self.lamps.items()
-                for name, patch in comparison.patches.items()
-            ),
+                lamp,
+                name,
+                *(f"{number:.6g}" for number in (*patch.value, *patch.predicted, *patch.pull)),
+                *(f"{number:.4f}" for number in (*patch.measured.lab, *patch.whole.lab)),
+                f"{patch.delta_e.value:.4f}",
+                f"{patch.delta_e.sigma:.4f}",
+                f"{patch.delta_e_reflected.value:.4f}",
+            )
+            for lamp, comparison in self.lamps.items()
+            for name, patch in comparison.patches.items()
         )
+        names = ("lamp", "patch", *head, *labs, "delta_e", "delta_e_sigma", "delta_e_reflected")
+        return {"illuminants.csv": CsvTable(names, rows)}

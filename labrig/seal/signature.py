@@ -168,11 +168,10 @@ def signer_of(message: bytes, signature: str) -> PublicKey:
 
 def _parse(signature: str) -> tuple[PublicKey, bytes, bytes]:
     """Return key, name of the hash, and signature proper."""
-    lines = signature.split()
-    text = "".join(signature.strip().splitlines()[1:-1])
-    if " ".join(lines[:3]) != _BEGIN or " ".join(lines[-3:]) != _END:
+    begin, *text, end = [" ".join(line.split()) for line in signature.strip().splitlines()]
+    if (begin, end) != (_BEGIN, _END):
         raise ValueError("no armour")
-    content = b64decode(text, validate=True)
+    content = b64decode("".join(text), validate=True)
     head = _MAGIC + _VERSION
     if not content.startswith(head):
         raise ValueError("another version")

@@ -39,7 +39,7 @@ _SKETCH = (
     ', state: {send: "state 0", on: "on", off: "off"}, warm_up: 15 min'
 )
 _UNKNOWN_HINT = (
-    "nothing tells what is behind it: if it is a relay board, write its own commands and answers "
+    "the device behind it is unknown: if it is a relay board, write its own commands and answers "
     "in place of these"
 )
 
@@ -67,7 +67,7 @@ _BOARDS: dict[tuple[int, int | None], _Board] = {
         "CH340 adapter, as on LCUS relay boards and Arduino clones",
         "lcus",
         ", relay: 1, warm_up: 15 min",
-        hints=("nothing tells what is behind it: use its line only if it is an LCUS board",),
+        hints=("the device behind it is unknown: use its line only if it is an LCUS board",),
     ),
     (0x1FFB, 0x0089): _MAESTRO,
     (0x1FFB, 0x008A): _MAESTRO,

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from labrig.acquire import ROLES, DeviceEntry, RigFile, driver_and_settings, load_driver
+from labrig.acquire import CAMERA, ROLES, DeviceEntry, RigFile, driver_and_settings, load_driver
 from labrig.foundation.errors import UsageError
 from labrig.foundation.key_texts import descriptions
 from labrig.foundation.yaml_file import parse_yaml, validate, yaml_text
@@ -234,6 +234,16 @@ class NewRig:
             parts += [f"{section}:\n", *(f"  {_one_line(*each)}\n" for each in content.items())]
         return "".join(parts)
 
+    def unmeasured(self) -> tuple[str, ...]:
+        """Return what no check can measure, with what does."""
+        lag = self.devices.get(CAMERA.key, {}).get("shutter_lag")
+        if lag is None:
+            return ()
+        return (
+            f"not measured: shutter_lag ({lag}), which no camera reports; the protocol fade finds "
+            "it by light",
+        )
+
     def _content(self) -> dict[str, Any]:
         content: dict[str, Any] = {"name": self.name, "devices": dict(self.devices)}
         return content | self._room()
@@ -254,6 +264,7 @@ class NewRig:
             else:
                 yield _commented(f"    {_one_line(key, value)}", comment)
         yield from (f"    # {line}\n" for line in self.measured.get(role, ()))
+        yield from (f"    # {line}\n" for line in self.unmeasured() if role == CAMERA.key)
 
     def _other_lines(self) -> Iterator[str]:
         for other in self.others:

@@ -158,7 +158,7 @@ def _chosen(
         if not fitting:
             raise UsageError(
                 f"{role}.address: no {noun} was recognised at {given['address']}; name its driver, "
-                f"too: --set {role}.driver=NAME ('labrig rig list' shows the ports)"
+                f"too: --set {role}.driver=NAME ('labrig rig devices' shows the ports)"
             )
         return fitting[0]
     for each in fitting:
@@ -234,6 +234,11 @@ def set_up(rig: NewRig, dialogue: Dialogue, source: str) -> NewRig:
             part = devices.devices.get(role.key)
             if isinstance(part, ServoSwing) and isinstance(part.ends_at()[0], float):
                 ends[role.key] = _ends(role.key, part, bench, dialogue)
+            elif part is not None:
+                dialogue.tell(
+                    f"{role.key}: its board takes commands or names of places, no pulses: its ends "
+                    "are as given, and the check swings it"
+                )
     for key, places in ends.items():
         rig = rig.with_device(key, {**rig.devices[key], **places})
     return rig

@@ -246,7 +246,7 @@ class AngularFluorescence(ProtocolModel):
 
 _SPHERE = ManualStep(
     "put the sphere in anew, turned a little about itself",
-    "what differs from view to view tells how certain each of them is",
+    "the scatter from view to view is the uncertainty of each view",
     "sphere anew",
 )
 
@@ -254,7 +254,7 @@ _SPHERE = ManualStep(
 def _yarn(direction: str, angle: int) -> ManualStep:
     return ManualStep(
         f"put the yarn in anew, {direction}, and turn the light to {angle}° from the camera",
-        "what differs between views of one angle tells how certain each of them is",
+        "the scatter between views of one angle is the uncertainty of each view",
         f"yarn {direction} {angle}",
     )
 

@@ -195,8 +195,9 @@ def _sphere_section(result: AngularFluorescenceResult) -> Section:
             "A fabric on a sphere shows all angles of incidence at once. The fall-off of the light "
             "is divided out by its place; a scale and a small turn of the light are free in each "
             "view. Beside Lambert's law the radiance may change with the angle of view and with "
-            "that of incidence: told is the change from 0° to 90°, tested against the scatter "
-            "between views and what these share: distance of the light, outline, and lens.",
+            "that of incidence: the result is the change from 0° to 90°, tested against the "
+            "scatter between views and their common errors: distance of the light, outline, and "
+            "lens.",
             *_lens(result.spheres),
         ),
         tuple(
@@ -219,8 +220,8 @@ def _lens(spheres: Sequence[SphereViews]) -> tuple[str, ...]:
     if all(views.is_lens_known for views in spheres):
         return ()
     return (
-        "The lens is not calibrated, and what it may do to the picture decides how small a change "
-        "by view can be found: run camera_calibration, and name its run in the rig file.",
+        "The lens is not calibrated, and its possible distortion limits the smallest change by "
+        "view that can be detected: run camera_calibration, and name its run in the rig file.",
     )
 
 

@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.results.angular_dependence import AngleMeans, DependenceTest, ShadingFit
 from labrig.results.budget import Budget
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,13 +127,13 @@ class AngularFluorescenceResult(RunResult):
                 tests[f"{view.led}: by incidence"] = view.shading.by_incidence
         return {name: Budget.of(test.amplitude) for name, test in tests.items()}
 
-    def write_files(self, folder: Path) -> None:
-        """Write `angular.csv`."""
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `angular.csv`."""
         head = (
             *("led", "sample", "part", "angle_deg", "cos_incidence"),
             *("ratio", "ratio_sigma", "oren_nayar"),
         )
-        write_csv(folder / "angular.csv", head, self._rows())
+        return {"angular.csv": CsvTable(head, self._rows())}
 
     def _rows(self) -> Iterator[tuple[Any, ...]]:
         for yarn in self.yarns:

@@ -41,7 +41,7 @@ from labrig.protocols.steps.sanity_checks import SanityChecks
 from labrig.record import FrameRole
 
 #: Reason for the blank.
-WHY = "what the sequence shows without a glow is measured"
+WHY = "the frames of the sequence without a glow are measured"
 #: Role of the frames of the sequence.
 BLANK_FRAMES = "blank"
 #: Begin of the first frame of a sequence without a door.

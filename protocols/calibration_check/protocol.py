@@ -28,7 +28,7 @@ from labrig.results import Measured, PictureChange
 
 #: Significance in σ below which nothing counts as changed.
 CLEAR = 3.0
-ANEW = "calibrate anew (labrig run calibration), or put back what was changed"
+ANEW = "calibrate anew (labrig run calibration), or undo the change"
 
 
 class CheckFrames(StrEnum):

@@ -171,10 +171,11 @@ def _warnings(fit: CameraCurvesFit, scene: ChartScene, filtered: bool) -> Iterat
         worst = CHART_PATCHES[int(pulls.max(axis=1).argmax())]
         yield Contradiction(
             "chart-unusual",
-            "the patches differ {misfit:.1f} times as much from what a camera would see as charts "
+            "the patches differ from the prediction by a camera {misfit:.1f} times as much as "
+            "charts "
             "do from their published means: the chart is another one, faded, shiny or in glare "
-            "(name a table of your own chart as 'chart:'); σ was raised by as much, and the patch "
-            "that is off most, {worst}, is off by {most_sigmas:.1f} of it",
+            "(name a table of your own chart as 'chart:'); σ was raised by as much, and the worst "
+            "patch, {worst}, is off by {most_sigmas:.1f} of it",
             misfit=fit.misfit,
             worst=worst,
             most_sigmas=pulls.max(),

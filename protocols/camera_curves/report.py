@@ -64,10 +64,11 @@ def _curves(result: CameraCurvesResult) -> Section:
     return Section(
         "Spectral sensitivity",
         (
-            f"Estimated from a ColorChecker under {result.lamp}, {more}and what {used} have in "
-            "common. σ is that of noise, of the chart against its published means, of the lamp's "
-            "spectrum, and of what these leave open among cameras. A factor common to all values "
-            "is not in it; errors of neighbouring wavelengths go together.",
+            f"Estimated from a ColorChecker under {result.lamp}, {more}and the common properties "
+            "of "
+            f"{used}. σ includes noise, the difference of the chart from its published means, the "
+            "lamp's spectrum, and the remaining differences among cameras. It does not include a "
+            "factor common to all values; errors of neighbouring wavelengths go together.",
         ),
         (
             Picture(

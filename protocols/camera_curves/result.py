@@ -1,16 +1,14 @@
 """Result of a measurement of camera curves, and its file `curves.csv`."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
-from labrig.foundation.output_file import write_text
+from labrig.foundation.notebook_views import CsvTable
 from labrig.optics import CHART_PATCHES, CURVES_FILE, CameraResponse
 from labrig.results.run_result import RunResult
-from labrig.text_table import table_text
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,10 +87,10 @@ class CameraCurvesResult(RunResult):
         pulls = (self.patch_value - self.patch_fitted) / self.patch_sigma
         return dict(zip(CHART_PATCHES, pulls, strict=True))
 
-    def write_files(self, folder: Path) -> None:
-        """Write `curves.csv`, which a rig file names under `optics: camera`."""
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `curves.csv`, which a rig file names under `optics: camera`."""
         head = ["wavelength_nm", *self.channels, *(f"{name}_sigma" for name in self.channels)]
         rows = np.column_stack([self.wavelength_nm, self.sensitivity, self.sigma])
         cells = ([f"{number:.6g}" for number in row] for row in rows)
         title = " ".join(f"#Camera: {self.camera}".split())
-        write_text(folder / CURVES_FILE, table_text(head, cells, [title]))
+        return {CURVES_FILE: CsvTable(head, cells, (title,))}

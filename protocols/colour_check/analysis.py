@@ -448,7 +448,7 @@ def _plain_warnings(
     if summary.verdict == "differs":
         yield Contradiction(
             "colours-differ",
-            "ΔE2000 is {mean:.1f} on average, {allowed:.1f} is what errors allow (most {worst}, "
+            "ΔE2000 is {mean:.1f} on average, errors allow {allowed:.1f} (most {worst}, "
             "{largest:.1f}); the camera's curves are those of another camera, or the chart is "
             "another one, faded or in glare",
             subject="plainly",
@@ -478,7 +478,7 @@ def _through_warnings(
     if summary.verdict == "differs":
         yield Contradiction(
             "colours-differ",
-            "ΔE2000 is {mean:.1f} on average, {allowed:.1f} is what errors allow (most {worst}, "
+            "ΔE2000 is {mean:.1f} on average, errors allow {allowed:.1f} (most {worst}, "
             "{largest:.1f}); a patch did not fill the strip, or the filter is not as it was "
             "calibrated: run lvf_calibration again",
             subject="through the filter",
@@ -498,7 +498,8 @@ def _through_warnings(
         yield Misfit(
             "card-through-filter",
             "the grey card through the filter differs {misfit:.1f} times as much as errors allow "
-            "from what lamp, filter and camera make of it; the lamp or the camera's curves are not "
+            "from the prediction by lamp, filter and camera; the lamp or the camera's curves are "
+            "not "
             "those of the rig file, or the filter is not as it was calibrated",
             misfit=through.misfit,
         )

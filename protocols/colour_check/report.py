@@ -81,15 +81,15 @@ def _text(result: ColourCheckResult) -> Iterator[str]:
             result.channels, result.card_balance, result.card_balance_sigma, strict=True
         )
     )
-    yield f"Grey card over what curves and lamp expect of it, relative to the mean: {balance}."
+    yield f"Grey card over the prediction by curves and lamp, relative to the mean: {balance}."
     if result.card_misfit is not None and result.filter_shift_nm is not None:
         yield (
             f"Through the filter it differs {result.card_misfit:.2f} times as much as errors "
             f"allow; the strip lies {result.filter_shift_nm:+.1f} nm from where it was calibrated."
         )
     yield (
-        "Allowed is what errors would make: those of one's own chart against the published means "
-        "(2 % of level, 1.5 % of course), of curves, card and filter, and noise."
+        "Allowed is the difference that known errors make: the difference of your chart from the "
+        "published means (2 % of level, 1.5 % of course), curves, card, filter and noise."
     )
 
 

@@ -2,15 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.results.budget import Budget
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,17 +131,14 @@ class ColourCheckResult(RunResult):
             if summary is not None
         }
 
-    def write_files(self, folder: Path) -> None:
-        """Write a table of the patches, `colour_check.csv`."""
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return a table of the patches, `colour_check.csv`."""
         labs = [f"{what}_{axis}" for what in ("published", "plain", "through") for axis in "Lab"]
         deltas = [
             f"{what}_{kind}" for what in ("plain", "through") for kind in ("delta_e", "allowed")
         ]
-        write_csv(
-            folder / "colour_check.csv",
-            ("patch", *labs, *deltas),
-            ((name, *_cells(patch)) for name, patch in self.patches.items()),
-        )
+        rows = ((name, *_cells(patch)) for name, patch in self.patches.items())
+        return {"colour_check.csv": CsvTable(("patch", *labs, *deltas), rows)}
 
 
 def _cells(patch: CheckedPatch) -> list[str]:

@@ -255,7 +255,7 @@ def _step(protocol: DirectBispectral, stage: str) -> ManualStep:
     """Return the step that puts a stage before the spectrometer, where the lights shine at 45°."""
     if stage == WHITE:
         what = "put the white reference (the rig's grey card) before the spectrometer"
-        return ManualStep(what, "it tells the light's spectrum and power", "grey card")
+        return ManualStep(what, "it measures the light's spectrum and power", "grey card")
     number = protocol.samples.index(stage) + 1
     what = f"put the sample {stage} before the spectrometer, exactly where the white was"
     return ManualStep(what, "it is read under every light", f"sample {number}")

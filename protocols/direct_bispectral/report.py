@@ -153,8 +153,8 @@ def _sample_section(name: str, columns: DirectColumns) -> Section:
     text = (
         "A column is the light that comes back over the light that falls in, read under one light "
         "after another. In the light's own band reflected and re-radiated light come together: "
-        "there the re-radiation is told only where another light tells the reflectance, and the "
-        "reflectance has what may be re-radiated in its σ.",
+        "there the re-radiation is stated only where another light determines the reflectance, "
+        "and σ of the reflectance includes the possible re-radiation.",
     )
     fraction, sigma = _reradiated(columns)
     rows = tuple(_row(columns, number, fraction, sigma) for number in range(len(columns.lights)))
@@ -186,7 +186,7 @@ _COLUMNS_CAPTION = (
 )
 _EMISSION_CAPTION = f"Re-radiation per {BAND_NM:g} nm under the strongest excitations; band: ± 1 σ."
 _REFLECTANCE_CAPTION = (
-    "Reflectance where some light is; bars: ± 1 σ, of what may be re-radiated, too."
+    "Reflectance at the wavelengths of the lights; bars: ± 1 σ, possible re-radiation included."
 )
 
 

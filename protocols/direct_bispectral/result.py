@@ -7,12 +7,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from labrig.foundation.notebook_views import CsvTable
 from labrig.foundation.output_file import make_folder_in
 from labrig.material import write_fluorescent, write_reradiation
 from labrig.results.budget import Budget, named
 from labrig.results.direct_columns import DirectColumns, DirectMeasurement, LightSpectrum
-from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
+from labrig.results.run_result import RunResult, in_folders
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,19 +64,26 @@ class DirectBispectralResult(RunResult):
             if np.isfinite(columns.reradiated[:, number]).any()
         }
 
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `columns.csv` of each sample; of several, in a folder of its name."""
+        head = (
+            "light", "light_nm", "output_nm", "column", "column_sigma", "share_of_light",
+            "mixed", "reradiated", "reradiated_sigma",
+        )  # fmt: skip
+        tables = {
+            name: {"columns.csv": CsvTable(head, _rows(columns))}
+            for name, columns in self.samples.items()
+        }
+        return in_folders(tables) if len(tables) > 1 else next(iter(tables.values()), {})
+
     def write_files(self, folder: Path) -> None:
         """Write the files of each sample, those of the only one into the folder itself.
 
-        They are `columns.csv`, `matrix.csv` with the lights as input bands, and `material.yaml`
-        with its matrix on input bands of 10 nm.
+        They are `matrix.csv` with the lights as input bands, and `material.yaml` with its matrix on
+        input bands of 10 nm.
         """
         for name, columns in self.samples.items():
             place = make_folder_in(folder, name) if len(self.samples) > 1 else folder
-            head = (
-                "light", "light_nm", "output_nm", "column", "column_sigma", "share_of_light",
-                "mixed", "reradiated", "reradiated_sigma",
-            )  # fmt: skip
-            write_csv(place / "columns.csv", head, _rows(columns))
             if len(columns.lights) > 1:
                 write_reradiation(place / "matrix.csv", columns.matrix(name))
                 write_fluorescent(place / "material.yaml", columns.interpolated(name)[0])

@@ -570,7 +570,7 @@ def _uncharged_warnings(charges: Sequence[_Charge]) -> Iterator[ResultWarning]:
         if float(new_glow @ remaining_glow) < CHARGED_ANEW * float(remaining_glow @ remaining_glow):
             yield Unmeasured(
                 "lamp-excites-nothing",
-                "after charging with the {lamp} lamp the glow is no brighter than what was left "
+                "after charging with the {lamp} lamp the glow is no brighter than "
                 "before: the {lamp} lamp did not light, or hardly excites this sample",
                 lamp=after.lamp,
             )

@@ -71,7 +71,7 @@ MIN_FILTERS = 4
 THROUGH_IT = "the glow is photographed through it"
 THROUGH_FILTERS = "the glow is photographed through one filter after another"
 OTHER_LAMP = "the glow is to have the same colour whatever lamp charged it"
-WHITE = "it tells what the camera's curves are off by"
+WHITE = "it measures the error of the camera's curves"
 
 
 class CameraFilters(FrozenModel):

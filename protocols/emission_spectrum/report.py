@@ -73,9 +73,10 @@ def _resolved(patch: PatchSpectrum) -> str:
     """Return the statement on what is narrower than the filters."""
     if patch.filters:
         return (
-            f"{len(patch.filters)} filters and the camera's channels do not resolve what is "
-            "narrower than some 40 nm: σ is that of a spectrum with peaks of 25 nm and more. Of "
-            "lines only the sum is measured; a variable filter or a spectrometer tells them."
+            f"{len(patch.filters)} filters and the camera's channels do not resolve "
+            "details narrower than about 40 nm: σ is right for spectra with peaks of 25 nm and "
+            "more. Only the sum of narrow lines is measured; a variable filter or a spectrometer "
+            "resolves them."
         )
     return (
         "Of lines much narrower than the filter's band the sum of the light is measured; how "

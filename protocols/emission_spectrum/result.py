@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.foundation.output_file import make_folder_in
 from labrig.results.budget import Budget, named
 from labrig.results.emission_spectrum import (
@@ -14,7 +15,7 @@ from labrig.results.emission_spectrum import (
     SpectralComparison,
     write_emission_spectrum,
 )
-from labrig.results.run_result import RunResult
+from labrig.results.run_result import RunResult, in_folders
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,9 +114,12 @@ class EmissionSpectrumResult(RunResult):
             for name, patch in self.patches.items()
         }
 
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `spectrum.csv` of each patch, in a folder of its name."""
+        spectra = {name: patch.spectrum for name, patch in self.patches.items()}
+        return in_folders({name: spectrum.csv_tables() for name, spectrum in spectra.items()})
+
     def write_files(self, folder: Path) -> None:
-        """Write `emission.yaml` and `spectrum.csv`; of several patches in a folder each."""
+        """Write `emission.yaml` of each patch, in a folder of its name."""
         for name, patch in self.patches.items():
-            place = make_folder_in(folder, name)
-            write_emission_spectrum(place / "emission.yaml", patch.spectrum)
-            patch.spectrum.write_csv(place / "spectrum.csv")
+            write_emission_spectrum(make_folder_in(folder, name) / "emission.yaml", patch.spectrum)

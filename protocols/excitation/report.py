@@ -336,7 +336,7 @@ def _layer_line(layer: LayerEffect) -> str:
     """Return the sentence on the thickness of the sample."""
     return (
         f"Thickness, before all σ: {layer}. Light falls with depth, and rates are fitted as those "
-        "of a surface; a range is what may be, and no σ."
+        "of a surface; the range contains all possible values and is no σ."
     )
 
 
@@ -344,15 +344,15 @@ def _light_line(light: LightScatter) -> str:
     """Return the sentence on the errors of the light."""
     if light.sites is None or light.wavelength_nm is None:
         return (
-            "As the glow itself shows, and as is in all σ, the light scatters by "
-            f"{rounded(100 * light.lamp, 2)} % from charge to charge beyond what the calibrations "
-            "state."
+            "The glow shows, and all σ include, that the light scatters by "
+            f"{rounded(100 * light.lamp, 2)} % from charge to charge beyond the calibrations' "
+            "σ."
         )
     return (
-        "As the glow itself shows, and as is in all σ, the lamp's brightness scatters by "
+        "The glow shows, and all σ include, that the lamp's brightness scatters by "
         f"{rounded(100 * light.lamp, 2)} % from charge to charge, the light on single places by "
         f"{rounded(100 * light.sites, 2)} %, and the filter's wavelengths are off by "
-        f"{rounded(light.wavelength_nm, 2)} nm beyond what the calibrations state."
+        f"{rounded(light.wavelength_nm, 2)} nm beyond the calibrations' σ."
     )
 
 
@@ -370,8 +370,8 @@ def _levels_table(fit: FittedExcitation, caption: str) -> Table:
         caption = caption.replace("k_r r(0) after", "k_r r(0)ᵇ after")
         caption += (
             " b is the kinetic order; the glow after that charge decays as a (1 + t/τ)^(−p). k_r "
-            "and the amplitude belong to r = 1, and are left out where the charge does not tell "
-            "them from r(0)."
+            "and the amplitude belong to r = 1, and are left out where the charge does not "
+            "separate them from r(0)."
         )
     rows = tuple(_levels_row(fit, number) for number in range(len(fit.states)))
     return Table(tuple(head), rows, caption)

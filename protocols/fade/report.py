@@ -6,7 +6,9 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
+from labrig.acquire import CAMERA
 from labrig.calibration import Change, FadeFile, Warming
+from labrig.foundation.detection import DECAY_DETECTION_SIGMA
 from labrig.foundation.number_format import plus_minus, rounded
 from labrig.protocols.fade.result import FadeResult, LampChange, WarmingLight
 from labrig.report.figure_style import (
@@ -33,11 +35,20 @@ def render(result: FadeResult, source: Source) -> Rendered:
     changes = [("fade", file.fade, result.fade)]
     if file.rise is not None and result.rise is not None:
         changes.append(("rise", file.rise, result.rise))
-    sections, lines = [_changes(file, changes)], list(_lines(changes))
+    sections, lines = [_changes(file, changes)], [*_lines(changes), *_lag_lines(result, source)]
     if file.warming is not None and result.warming is not None:
         sections.append(_warming(file.warming, result.warming))
         lines.append(_warming_line(file.warming))
     return Rendered(tuple(sections), tuple(lines))
+
+
+def _lag_lines(result: FadeResult, source: Source) -> Iterator[str]:
+    """Yield by how much the shutter lag of the run's rig file is off, if it is for certain."""
+    given = source.rig.devices[CAMERA.key].settings().get("shutter_lag", "0 s")
+    off = result.fade.lag
+    if abs(off.value) > DECAY_DETECTION_SIGMA * off.sigma:
+        milliseconds = plus_minus(1e3 * off.value, 1e3 * off.sigma)
+        yield f"shutter_lag of the rig file ({given}): add {milliseconds} ms to it"
 
 
 def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> Section:

@@ -47,8 +47,8 @@ def _section(result: IrradianceResult) -> Section:
         )
         caption = "Irradiance of every band by each light at its mean wavelength, with 1 σ"
         scale = (
-            "Measured light of the card over that expected of each light: alone (points, 1 σ with "
-            "the camera's curves), and with what was known of the light (line and band)."
+            "Measured over expected light of the card for each light: by the measurement alone "
+            "(points, 1 σ with the camera's curves), and with the prior of the light (line, band)."
         )
     else:
         parts = (

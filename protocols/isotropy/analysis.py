@@ -149,8 +149,8 @@ def _warnings(glow: AngularGlow) -> Iterator[ResultWarning]:
     if not is_within_paper(glow.drift):
         yield Disturbance(
             "glow-drifts",
-            "between the straight views before and after the others the glow changed to "
-            "{ratio.plus_minus} of what it was; the drift is taken for even in time: was lamp, "
-            "sample or camera moved?",
+            "between the straight views before and after the others the glow changed by a "
+            "factor of {ratio.plus_minus}; the drift is assumed to be even in time: was the lamp, "
+            "the sample or the camera moved?",
             ratio=glow.drift,
         )

@@ -126,8 +126,8 @@ class AngleUnit:
         first_s = lamp_off_s + self.protocol.first - session.clock.now()
         if first_s < 0:
             session.warn(
-                f"turned {duration_text(-first_s)} later than the first frame was planned; what "
-                "faded meanwhile is taken from the straight views (give yourself more time: first:)"
+                f"turned {duration_text(-first_s)} after the planned time of the first frame; the "
+                "straight views correct for the decay meanwhile (for more time, raise first:)"
             )
         late_s = max(first_s, 0.0) - self.protocol.first
         glow = [

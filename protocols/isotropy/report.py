@@ -60,10 +60,10 @@ def _section(result: IsotropyResult) -> Section:
     """Return the section with the figure and the table of all patches."""
     patches = result.patches
     geometry = (
-        "The patches enclose the whole sample: what they show is its intensity, here divided by "
+        "The patches enclose the whole sample: they show its intensity, here divided by "
         "the cosine of the angle."
         if result.encloses_sample
-        else "The patches lie inside of the sample: what they show is its radiance, which is the "
+        else "The patches lie inside of the sample: they show its radiance, which is the "
         "same at all angles if the emission is isotropic."
     )
     drift = ", ".join(

@@ -2,16 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray, IntArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.results.budget import Budget, named
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
 
 #: Largest fluctuation of the paper's samples (section 4).
 PAPER_FLUCTUATION = 0.05
@@ -115,8 +114,8 @@ class IsotropyResult(RunResult):
             for name, glow in self.patches.items()
         }
 
-    def write_files(self, folder: Path) -> None:
-        """Write `isotropy.csv`."""
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `isotropy.csv`."""
         rows = (
             (name, angle_deg, f"{ratio:.6g}", f"{sigma:.6g}")
             for name, glow in self.patches.items()
@@ -125,4 +124,4 @@ class IsotropyResult(RunResult):
             )
         )
         head = ("patch", "angle_deg", "ratio", "ratio_sigma")
-        write_csv(folder / "isotropy.csv", head, rows)
+        return {"isotropy.csv": CsvTable(head, rows)}

@@ -9,12 +9,13 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.foundation.output_file import make_folder_in
 from labrig.material import Provenance, write_fluorescent
 from labrig.results.budget import Budget, named
 from labrig.results.fluorescent_patch import FluorescentPatch
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv, write_json
+from labrig.results.text_files import write_json
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -94,8 +95,24 @@ class LedFluorescenceResult(RunResult):
             }
         return budgets
 
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table of colours under lights, `colours.csv`."""
+        head = ("patch", "light", "L", "a", "b", "L_sigma", "a_sigma", "b_sigma", "depends_on_uv")
+        rows = (
+            (
+                name,
+                colour.light,
+                *(f"{number:.4f}" for number in colour.lab),
+                *("" if isnan(sigma) else f"{sigma:.4f}" for sigma in colour.lab_sigma),
+                str(colour.depends_on_uv).lower(),
+            )
+            for name, patch in self.patches.items()
+            for colour in patch.colours
+        )
+        return {"colours.csv": CsvTable(head, rows)}
+
     def write_files(self, folder: Path) -> None:
-        """Write a material file, its matrix and mixture for each sample, and a table of colours."""
+        """Write a material file, its matrix and mixture for each sample."""
         for name, patch in self.patches.items():
             place = make_folder_in(folder, name) if len(self.patches) > 1 else folder
             note = f"method: {patch.method}; ultraviolet scale: {self.uv_scale}"
@@ -107,18 +124,3 @@ class LedFluorescenceResult(RunResult):
             write_fluorescent(place / "material.yaml", patch.matrix.named(name), origin)
             if patch.mixture is not None:
                 write_json(place / "mixture.json", patch.mixture.to_dict())
-        write_csv(
-            folder / "colours.csv",
-            ("patch", "light", "L", "a", "b", "L_sigma", "a_sigma", "b_sigma", "depends_on_uv"),
-            (
-                (
-                    name,
-                    colour.light,
-                    *(f"{number:.4f}" for number in colour.lab),
-                    *("" if isnan(sigma) else f"{sigma:.4f}" for sigma in colour.lab_sigma),
-                    str(colour.depends_on_uv).lower(),
-                )
-                for name, patch in self.patches.items()
-                for colour in patch.colours
-            ),
-        )

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.foundation.output_file import make_folder, write_text
 from labrig.results.budget import Budget, named
 from labrig.results.luminance import TABLE_S, LuminanceDecay
 from labrig.results.measured import Measured
-from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
+from labrig.results.run_result import RunResult, in_folders
 
 #: Columns of `luminance.csv`, which `labrig fit luminance` reads.
 HEAD = ("t_s", "luminance_mcd_per_m2", "luminance_mcd_per_m2_sigma")
@@ -112,12 +112,15 @@ class PatchLuminance:
     relative_to_first: Mapping[float, Measured] | None = None
 
     def write_files(self, folder: Path) -> None:
-        """Write `luminance.json`, as `labrig fit luminance --json` prints it, and the readings."""
+        """Write `luminance.json`, as `labrig fit luminance --json` prints it."""
         make_folder(folder)
         write_text(folder / "luminance.json", self.decay.to_json())
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the readings as `luminance.csv`."""
         columns = (self.decay.t_s, self.decay.luminance_mcd_per_m2, self.decay.sigma_mcd_per_m2)
         rows = (tuple(f"{number:.8g}" for number in row) for row in zip(*columns, strict=True))
-        write_csv(folder / "luminance.csv", HEAD, rows)
+        return {"luminance.csv": CsvTable(HEAD, rows)}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -172,6 +175,11 @@ class LuminanceResult(RunResult):
             for name, patch in self.patches.items()
             for quantity, budget in patch.decay.budgets().items()
         }
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table of each patch; of several patches, each in a folder of its name."""
+        tables = {name: patch.csv_tables() for name, patch in self.patches.items()}
+        return in_folders(tables) if len(tables) > 1 else next(iter(tables.values()), {})
 
     def write_files(self, folder: Path) -> None:
         """Write the files of each patch; of several patches, each into a folder of its name."""

@@ -135,9 +135,9 @@ _BEFORE_CAMERA = BenchConfiguration("grey card", "before camera")
 _WHY: dict[str, str] = {
     LvfFrames.CARD: "how bright the card is at every place by itself",
     LvfFrames.STRIP_ON_SAMPLE: "where the filter's strip falls on the sample",
-    LvfFrames.FILTER: "what the variable filter passes follows from what colour filters take away",
-    LvfFrames.LINES: "mercury lines tell the wavelength of every place",
-    LvfFrames.LINES_ON_SAMPLE: "mercury lines tell the wavelength of every place on the sample",
+    LvfFrames.FILTER: "colour filters of known transmission calibrate the variable filter",
+    LvfFrames.LINES: "mercury lines determine the wavelength of every place",
+    LvfFrames.LINES_ON_SAMPLE: "mercury lines determine the wavelengths on the sample",
     LvfFrames.STRIPES: "the stripes glow where the camera will see the sample",
 }
 

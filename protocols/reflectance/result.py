@@ -9,10 +9,10 @@ import numpy as np
 
 from labrig.calibration import REFLECTANCE_KIND, PatchReflectance, ReflectanceFile
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.results.budget import HEADLINE_NM, Budget, named
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +115,11 @@ class ReflectanceResult(RunResult):
         return {REFLECTANCE_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:
-        """Write `reflectance.yaml` and `reflectance.csv`."""
+        """Write `reflectance.yaml`."""
         REFLECTANCE_KIND.write(folder, self.calibration)
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `reflectance.csv`."""
         head = (
             *("patch", "wavelength_nm", "albedo", "albedo_sigma"),
             *("radiance_factor", "radiance_factor_sigma"),
@@ -133,4 +136,4 @@ class ReflectanceResult(RunResult):
                 strict=True,
             )
         )
-        write_csv(folder / "reflectance.csv", head, rows)
+        return {"reflectance.csv": CsvTable(head, rows)}

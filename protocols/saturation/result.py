@@ -2,20 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable
 from labrig.results.budget import Budget, named
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_excitation import THICKNESS
 from labrig.results.fitted_law import EXPONENTIALS
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
-from labrig.results.text_files import write_csv
 
 #: Names of the lights of a saturation run, as in its units.
 LIGHTS = FULL_LIGHT, WEAKER = "full", "weaker"
@@ -296,8 +295,8 @@ class SaturationResult(RunResult):
             for number, level in enumerate(patch.levels, start=1)
         }
 
-    def write_files(self, folder: Path) -> None:
-        """Write `saturation.csv`."""
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the table `saturation.csv`."""
         head = ("patch", "light", "charge_s", "k_r_per_s", "amplitude", "amplitude_sigma")
         rows = []
         for name, patch in self.patches.items():
@@ -313,4 +312,4 @@ class SaturationResult(RunResult):
                     for numbers in state_values:
                         texts = (f"{number:.6g}" for number in (patch.charge_s[row], *numbers))
                         rows.append((name, light, *texts))
-        write_csv(folder / "saturation.csv", head, rows)
+        return {"saturation.csv": CsvTable(head, rows)}

@@ -75,14 +75,14 @@ _ERRORS = {
     Afterglow.RISING: "the second photograph after lamp off is brighter than the first: a trap "
     "door opens too slowly or gets stuck (look at it; if it always is that slow, raise its "
     "'travel:' in the rig file and 'first:'), or another light came on",
-    Afterglow.STEADY: "what the camera sees does not fade after lamp off: the lamp still burns "
+    Afterglow.STEADY: "the light does not fade after lamp off: the lamp is still on "
     "although its relay reads off (pull its plug, the contact may be welded), or another light "
     "is on",
 }
 
 
 _WARNINGS = {
-    Afterglow.WEAK: "the glow is less than half of what it was before: the lamp may have gone out "
+    Afterglow.WEAK: "the glow is less than half as bright as before: the lamp may have gone out "
     "while charging or stayed on too long before (check its bulb and its relay), or lamp, sample "
     "or camera was moved; amplitudes are not to be trusted",
     Afterglow.LINGERING: "the second half of the decay stays at one level: a light may have come "

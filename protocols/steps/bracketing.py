@@ -142,8 +142,8 @@ class Bracketing:
         if not detected:
             raise DeviceError(
                 f"{unit}: dark even in {duration_text(frames[-1].exposure_s)}: the {lamp} lamp did "
-                "not light (check its bulb, its plug and the contact of its relay), or what should "
-                "be seen is not in its place"
+                "not light (check its bulb, its plug and the contact of its relay), or the "
+                "target is not in its place"
             )
         unclipped = [reading for reading in detected if not reading.clips]
         if not unclipped:

@@ -12,9 +12,9 @@ from .bracketing import SceneUnit
 #: Names of the units of the card and of the chart, and of the card through a variable filter.
 CARD_UNIT, CHART_UNIT, THROUGH_UNIT = "card", "chart", "card-through"
 #: Reasons for the configurations, for the person.
-WHY_CARD = "its light at every place tells how evenly the chart will be lit"
+WHY_CARD = "its light at every place measures how evenly the chart will be lit"
 WHY_CHART = "its patches are known"
-WHY_THROUGH = "it tells what filter and camera see at every wavelength"
+WHY_THROUGH = "it measures the response of filter and camera at every wavelength"
 
 
 @dataclass(frozen=True)

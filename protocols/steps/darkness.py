@@ -71,7 +71,7 @@ class Darkness:
         if self.is_doubtful:
             raise DeviceError(
                 f"the dark frames are not dark ({self}) and do not fade: a light is on in the "
-                "room, or the lamp burns although its relay reads off: look, switch it off or "
+                "room, or the lamp is on although its relay reads off: look, switch it off or "
                 "pull its plug"
             )
         if self.is_bright:

@@ -25,7 +25,7 @@ from .sanity_checks import SanityChecks
 
 #: Reason for laying the card.
 CARD_REASON = (
-    "what is measured next is its light; it lies on the outside of the closed door, without a door "
+    "its light is measured next; it lies on the outside of the closed door, without a door "
     "over the sample"
 )
 
@@ -164,7 +164,7 @@ def _per_s(frames: Sequence[MeteringFrame]) -> float:
         frame
     ):
         raise DeviceError(
-            "the card is not lit: look whether the lamp burns, the card lies in its place and "
+            "the card is not lit: check that the lamp is on, the card lies in its place and "
             "'card:' is its region in the frame"
         )
     return brightest.peak / range_dn(frame) / frame.exposure_s

@@ -35,7 +35,7 @@ LED_NAMES = (
 ON_SAMPLE, ON_CARD = BenchConfiguration(), BenchConfiguration("grey card")
 #: Begin of the names of units, which end with the LED: the card, and the first LED once more.
 CARD, AGAIN = "card ", "again "
-CARD_REASON = "its light under every LED tells how bright the LED is"
+CARD_REASON = "its light under every LED measures the brightness of the LED"
 
 
 def _once(kind: str) -> AfterValidator:

@@ -161,7 +161,7 @@ class SanityChecks:
         self.session.run_sequence([at(0.0, LAMP_OFF), at(LAMP_GONE_S, look_again)])
         if not self.session.decide("lamp has gone out", gone_out, when_planned=True):
             raise DeviceError(
-                "it is as bright after lamp off as before: the lamp still burns although its relay "
+                "it is as bright after lamp off as before: the lamp is still on although its relay "
                 "reads off (pull its plug, the contact may be welded), or it did not light at all"
             )
 

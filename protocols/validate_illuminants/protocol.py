@@ -116,8 +116,8 @@ class ValidateIlluminants(ProtocolModel):
         """Return darks, the card under every lamp, the chart under one, the samples under all."""
         cards = [self._card(lamp) for lamp in self.lamps]
         samples = [self._sample(lamp) for lamp in self.lamps]
-        card = "its light under every lamp tells how bright the lamp is"
-        chart = "its colours tell how the camera sees colours"
+        card = "its light under every lamp measures the brightness of the lamp"
+        chart = "its colours determine the camera's response to colours"
         sample = "it is photographed under every lamp"
         before = ON_CHART if self.chart else ON_CARD
         return [

@@ -22,7 +22,7 @@ WHITES = {
 SCALES = {
     "card": "",
     "samples": (
-        "The camera hardly sees this lamp, so that the card does not tell its brightness: one "
+        "The camera hardly sees this lamp, so that the card does not measure its brightness: one "
         "number for all samples is fitted to the samples themselves. Reflected light is that of "
         "the tails of its spectrum, by the card."
     ),

@@ -35,8 +35,8 @@ PROTOCOLS = (
 )
 #: Largest difference that is asked for.
 LARGEST_S = 2.0
-#: Time that a frame of the small sensor takes, as `labrig rig check` measures it.
-FRAME_TIME = "300 ms"
+#: Times of a frame of the small sensor, and of other settings, as `labrig rig check` measures them.
+CAMERA = {"frame_time": "300 ms", "change_time": "33 ms"}
 T = TypeVar("T")
 
 
@@ -115,7 +115,7 @@ def recorded(place: Path, name: str, done: dict[str, Path]) -> Path:
     protocol, rig = read_yaml(case.protocol), read_yaml(case.rig)
     if name == CHAIN:
         protocol["parts"] = [{"protocol": each} | SHORTER[each] for each in CHAINED]
-    rig["devices"]["camera"]["frame_time"] = FRAME_TIME
+    rig["devices"]["camera"] |= CAMERA
     case.protocol.write_text(yaml_text(protocol), encoding="utf-8")
     case.rig.write_text(yaml_text(rig), encoding="utf-8")
     recording = Recording.prepare(case.protocol, case.rig, case.folder / "runs")

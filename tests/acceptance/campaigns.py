@@ -233,6 +233,7 @@ CAMPAIGNS = {
         _module("ptp_fuzz", "--cases", "10000", "--seed", "4"),
         _module("two_labrigs", "--trials", "40"),
         _module("suspended", "--trials", "20"),
+        _module("announced_end", "--cuts", "200"),
         _module("lamp_off_however_it_ends", timed=True),
         _module("gphoto2_latency", timed=True),
         _module("least_squares_starts"),

@@ -128,7 +128,7 @@ def _protocol_file(place: Path, case: Case) -> Path:
 
 
 def refit(series: Series, states: int, flicker: float) -> DecayFit:
-    """Fit a series as `labrig compare` does."""
+    """Fit a series as `labrig reproduce` does."""
     return fit_series(series, states, flicker=flicker)
 
 

@@ -481,3 +481,11 @@ def intervals(printed: str) -> str:
         f"{span(narrow)} % and {span(wide)} % in the intervals, {span(by_sigma)} % and "
         f"{span(by_two)} % within ± 1 σ and ± 1.96 σ"
     )
+
+
+def announced_end(printed: str) -> str:
+    """Return how late the end announced at resume was, and how often by less than 2 s."""
+    row = r"^all +\d+ +([-+.\d]+) to ([-+.\d]+), (\d+) of (\d+)"
+    (low,), (high,), (near,), (n,) = columns(row, printed)
+    late = f"late by {low:+.1f} to {high:+.1f} s".replace("-", "−")
+    return f"{late}; by less than 2 s in {near:.0f} of {n:.0f}"

@@ -1,10 +1,11 @@
 """Mistakes of a first day with labrig: for each the line that is printed, and the exit code.
 
-    python -m tests.acceptance.first_day [--labrig COMMAND]
+    python -m tests.acceptance.first_day [--labrig COMMAND] [--only WORDS ...]
 
-Every mistake is made in an empty folder by a command in a process of its own. A mistake is wrong if
-labrig does not end with one line on standard error that has what the beginner needs, such as the
-name that was meant, and with the exit code of its kind (2: asked for something that cannot be).
+Every mistake is made in a folder of its own by a command in a process of its own. A mistake is
+wrong if labrig does not end with one line on standard error that has what the beginner needs, such
+as the name that was meant, and with the exit code of its kind (2: asked for something that cannot
+be).
 Commands that must simply work are among them: what they print is compared alike.
 COMMAND is another labrig, such as one of an older clone, for a table of before and after.
 """
@@ -17,48 +18,20 @@ import sys
 import sysconfig
 import tempfile
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from math import exp
+from dataclasses import dataclass
 from pathlib import Path
+
+from tests.acceptance import first_day_files
+from tests.acceptance.mistake import DECAY, SIM_RIG, TWO_COLUMNS, Mistake, protocol_mistake
 
 MAX_S = 60.0
 
-DECAY = "protocol: decay\nsample: {name: paint}\ncharge: 5 min\nfor: 60 s\n"
-TIMES_S = range(0, 60, 2)
-INTENSITIES = [100 * exp(-time_s / 20) + 0.3 * (-1) ** (time_s // 2) for time_s in TIMES_S]
-TWO_COLUMNS = "time,intensity\n" + "".join(
-    f"{t},{i:.3f}\n" for t, i in zip(TIMES_S, INTENSITIES, strict=True)
-)
+#: Decay whose frames and journal the runs of mistakes have.
+RECORDED = Path(__file__).parents[1] / "recordings/decay/run"
 DECIMAL_COMMAS = TWO_COLUMNS.replace(",", ";").replace(".", ",")
 WITH_ERRORS = "time,intensity,Error\n" + "".join(
-    f"{t},{i:.3f},0.3\n" for t, i in zip(TIMES_S, INTENSITIES, strict=True)
+    f"{row},0.3\n" for row in TWO_COLUMNS.splitlines()[1:]
 )
-
-
-@dataclass(frozen=True)
-class Mistake:
-    """Something that a beginner does: a command, with the files that lie in the folder.
-
-    Attributes
-    ----------
-    needs
-        A regular expression: what the answer has to contain to be of help.
-    exit_code
-        Expected; 0 where labrig is to understand what was meant.
-    """
-
-    name: str
-    command: str
-    needs: str
-    exit_code: int = 2
-    files: Mapping[str, str] = field(default_factory=dict)
-
-
-def protocol_mistake(name: str, text: str, needs: str, exit_code: int = 2) -> Mistake:
-    """Return the mistake of planning this protocol on the simulated rig."""
-    files = {"mine.yaml": text}
-    return Mistake(name, "plan mine.yaml --rig sim", needs, exit_code, files)
 
 
 def rig_mistake(name: str, text: str, needs: str, exit_code: int = 2) -> Mistake:
@@ -71,15 +44,6 @@ def table_mistake(name: str, text: str, needs: str, exit_code: int = 0) -> Mista
     """Return the mistake of fitting this table, or what one expects to work."""
     return Mistake(name, "fit decay table.csv", needs, exit_code, {"table.csv": text})
 
-
-SIM_RIG = """\
-name: mine
-devices:
-  lamp: {driver: numato, address: sim://room/relays, relay: 0}
-  camera: {driver: ptp_camera, address: sim://room/camera, shutter_lag: 60 ms}
-optics: {camera: canon_eos_5d_mark_ii}
-simulation: {sample: blue-paint, sensor: {width: 96, height: 64}}
-"""
 
 MISTAKES = (
     Mistake("a command misspelt", "rnu decay --rig sim", "run"),
@@ -106,7 +70,9 @@ MISTAKES = (
     ),
     protocol_mistake("a sample that is a list", DECAY.replace("{name: paint}", "[a, b]"), "name"),
     protocol_mistake("a sample without a name", DECAY.replace("{name: paint}", ""), "name"),
-    protocol_mistake("an aperture the camera lacks", DECAY + "camera: {f_number: 3.3}\n", "2.8, 4"),
+    protocol_mistake(
+        "an aperture the camera lacks", DECAY + "camera: {f_number: 3.3}\n", "2.8, f/4"
+    ),
     protocol_mistake("an ISO the camera lacks", DECAY + "camera: {iso: 450}\n", "400"),
     protocol_mistake("four states", DECAY + "states: 4\n", "1, 2, 3|auto"),
     Mistake(
@@ -125,7 +91,7 @@ MISTAKES = (
     rig_mistake(
         "a serial port that is not there",
         SIM_RIG.replace("sim://room/relays", "/dev/ttyUSB97"),
-        "rig list|ttyUSB97",
+        "rig devices|ttyUSB97",
         3,
     ),
     rig_mistake(
@@ -153,6 +119,7 @@ MISTAKES = (
     table_mistake("a table of words", "Dear diary,\ntoday I measured.\n", "column|number", 2),
     table_mistake("a table with a gap", re.sub("(?m)^6,.*$", "6,", TWO_COLUMNS), "line [0-9]", 2),
     Mistake("a table that is not there", "fit decay table.csv", "table.csv"),
+    *first_day_files.MISTAKES,
 )
 
 
@@ -176,12 +143,20 @@ class Answer:
         return ""
 
 
-def answer(labrig: str, mistake: Mistake) -> Answer:
-    """Make a mistake in an empty folder."""
+def lay_out(mistake: Mistake, folder: Path, run: Path) -> None:
+    """Write the files of a mistake into an empty folder; `run` is a processed run."""
+    for name, text in mistake.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    if mistake.has_run:
+        shutil.copytree(run, folder / "runs/mine")
+        shutil.copy(sorted((run / "frames").iterdir())[-1], folder / "frame.dng")
+
+
+def answer(labrig: str, mistake: Mistake, run: Path) -> Answer:
+    """Make a mistake in a folder of its own."""
     folder = Path(tempfile.mkdtemp())
     try:
-        for name, text in mistake.files.items():
-            (folder / name).write_text(text, encoding="utf-8")
+        lay_out(mistake, folder, run)
         start_s = time.perf_counter()
         try:
             done = subprocess.run(
@@ -208,17 +183,23 @@ def main() -> None:
     """Print a line for each mistake; exit code 1 if an answer is of no help."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--labrig", default=f"{sysconfig.get_path('scripts')}/labrig")
+    parser.add_argument("--only", nargs="*", default=[""], help="words of mistakes; default: all")
     asked = parser.parse_args()
+    made = [each for each in MISTAKES if any(word in each.name for word in asked.only)]
     faults = 0
-    for number, mistake in enumerate(MISTAKES, 1):
-        given = answer(asked.labrig, mistake)
-        fault = given.fault(mistake)
-        faults += bool(fault)
-        print(f"{number:2} {mistake.name}: labrig {mistake.command}")
-        print(f"   {given.exit_code}, {given.duration_s:.1f} s: {given.line[:300]}")
-        if fault:
-            print(f"   WRONG: {fault}")
-    print(f"{len(MISTAKES)} mistakes, {faults} answered wrongly")
+    with tempfile.TemporaryDirectory() as scratch:
+        run = Path(scratch, "mine")
+        shutil.copytree(RECORDED, run)
+        subprocess.run([asked.labrig, "process", str(run)], capture_output=True, check=True)
+        for number, mistake in enumerate(made, 1):
+            given = answer(asked.labrig, mistake, run)
+            fault = given.fault(mistake)
+            faults += bool(fault)
+            print(f"{number:2} {mistake.name}: labrig {mistake.command}")
+            print(f"   {given.exit_code}, {given.duration_s:.1f} s: {given.line[:300]}")
+            if fault:
+                print(f"   WRONG: {fault}", flush=True)
+    print(f"{len(made)} mistakes, {faults} answered wrongly")
     sys.exit(1 if faults else 0)
 
 

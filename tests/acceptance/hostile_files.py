@@ -33,7 +33,7 @@ COMMANDS = [
     "resume FILE --yes --no-process", "process FILE", "process FILE --verify",
     "process RUN --camera FILE", "process RUN --optics camera=FILE", "figures FILE",
     "figures RUN --out FILE/figures.pdf", "frame FILE", "compare FILE", "compare FILE --rendered",
-    "compare RUN --material FILE", "compare RUN --camera FILE", "compare RUN --figures FILE",
+    "reproduce RUN --material FILE", "reproduce RUN --camera FILE", "reproduce RUN --out FILE",
     "render FILE --out OUT --paths 1", "render cornell-box --material FILE --out OUT",
     "render SCENE --out FILE --paths 1", "note FILE text", "design FILE --no-browser --port 0",
     "design cornell-box --constraints FILE", "design cornell-box --material FILE --out OUT/d.yaml",

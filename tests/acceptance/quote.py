@@ -1,10 +1,12 @@
-"""What a page of the manual says of a campaign's output."""
+"""Text of a page of the manual that a campaign's output determines."""
 
 from dataclasses import dataclass
 
 from tests.acceptance.printed import Extract
 
 EXPLANATION, HOW_TO, DECISIONS = "docs/explanation", "docs/how-to", "docs/decisions"
+#: Texts of `docs/validation`, into which figures and outputs are filled.
+VALIDATION = "tests/acceptance/validation_pages"
 
 
 @dataclass(frozen=True)

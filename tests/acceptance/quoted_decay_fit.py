@@ -1,12 +1,12 @@
-"""What the page on the decay fit says of its campaigns."""
+"""Figures of decays on the page of the validation."""
 
 import math
 import re
 
 from tests.acceptance.printed import columns, match, span
-from tests.acceptance.quote import EXPLANATION, Quote
+from tests.acceptance.quote import EXPLANATION, VALIDATION, Quote
 
-PAGE = f"{EXPLANATION}/decay_fit.md"
+PAGE = f"{VALIDATION}/decays.md"
 
 
 def _rms(case: str, printed: str) -> list[float]:
@@ -24,8 +24,8 @@ def _correlated(printed: str) -> str:
     independent = span(_rms(r"flicker, ρ = 0\.0, .*", printed), 1)
     return (
         f"Of tables with a correlation of 0.8 the pulls have an rms of {rms('120')} with 120 "
-        f"values, {rms('40|60')} with 40 and 60, and {rms('20')} with 20, which tell a drift "
-        f"hardly from the decay; of independent noise it is {independent}"
+        f"values, {rms('40|60')} with 40 and 60, and {rms('20')} with 20, which hardly "
+        f"distinguish a drift from the decay; of independent noise it is {independent}"
     )
 
 
@@ -109,6 +109,6 @@ QUOTES = (
     Quote(PAGE, "tables_of_wrong_sigma", _wrong_sigma),
     Quote(PAGE, "decay_states_that_hide", _hidden),
     Quote(PAGE, "law_confusion", _laws),
-    Quote(PAGE, "decay_fit_example", _example_rates),
-    Quote(PAGE, "decay_fit_example", _example),
+    Quote(f"{EXPLANATION}/decay_fit.md", "decay_fit_example", _example_rates),
+    Quote(f"{EXPLANATION}/decay_fit.md", "decay_fit_example", _example),
 )

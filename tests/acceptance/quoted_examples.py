@@ -3,7 +3,7 @@
 import re
 
 from tests.acceptance.printed import Extract, columns, match, part, span
-from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
+from tests.acceptance.quote import EXPLANATION, HOW_TO, VALIDATION, Quote
 
 
 def _console(command: str) -> Extract:
@@ -93,8 +93,8 @@ QUOTES = (
             _console("runs list"),
             _console(f"{_COMPARED}\n"),
             _console(f"{_COMPARED} --reference"),
-            _lines("patch +1 state", "paper, 11", "compare last\n"),
-            _lines("Measured: ", "k_e was not", "compare last --material"),
+            _lines("patch +1 state", "paper, 11", "reproduce last\n"),
+            _lines("Measured: ", "k_e was not", "reproduce last --material"),
             _lines("runs/", "  4 of 4", "runs show"),
             _lines("    states: ", "    1 ", "runs show"),
         )
@@ -116,16 +116,18 @@ QUOTES = (
     *(
         Quote(CAMERA, "manual_own_camera", text)
         for text in (
-            _lines("│ camera ", "│ +│ +│ the dark", "rig check ./my-rig.yaml"),
-            _lines("│ +│ +│ release asked", "│ +│ +│ the next", "rig check sim"),
-            _lines("│ +│ +│ for the rig file", "│.*│ frame_size.*(?:\n.*)?", "rig check sim"),
+            _lines("camera: ", "  refuse ", "rig check ./my-rig.yaml"),
+            _lines(" +release asked", " +exposure over", "rig check sim"),
+            _lines(" +for the rig file", " +for the rig file.*frame_size", "rig check sim"),
             _curves_of,
             _line("R  380.*", "optics show"),
             _line("G  380.*", "optics show"),
             _line("B  380.*", "optics show"),
             _lines("ISO 100", "ISO 200", "run camera_calibration"),
             _lines("flicker ", "aperture: ", "run camera_calibration"),
-            _line(r"vignetting: corners, beyond the card, at .*? at f/4,", "run camera_calibration"),
+            _line(
+                r"vignetting: corners, beyond the card, at .*? at f/4,", "run camera_calibration"
+            ),
         )
     ),
     Quote(
@@ -151,8 +153,8 @@ QUOTES = (
             _line(r"yellow: \d dye.*", "process last"),
             _line("daylight: .*", "run validate_illuminants"),
             _line("angular fluorescence: .*", "run angular_fluorescence"),
-            _direct,
             _direct_sigma,
         )
     ),
+    Quote(f"{VALIDATION}/fluorescence.md", "manual_fluorescent", _direct),
 )

@@ -9,7 +9,7 @@ from tests.acceptance import (
     quoted_samples,
 )
 from tests.acceptance.printed import Extract, columns, match, part, span
-from tests.acceptance.quote import DECISIONS, EXPLANATION, HOW_TO, Quote
+from tests.acceptance.quote import DECISIONS, EXPLANATION, HOW_TO, VALIDATION, Quote
 
 
 def _charging(printed: str) -> str:
@@ -243,7 +243,7 @@ def _most_that_returns(printed: str) -> str:
     return f"may do so (up to {most:.2f} of {count:.0f} measured surfaces)"
 
 
-FLUORESCENT = f"{HOW_TO}/fluorescent.md"
+FLUORESCENT = f"{VALIDATION}/fluorescence.md"
 
 
 def _light_errors(printed: str) -> str:
@@ -270,21 +270,21 @@ def _camera_curves(printed: str) -> str:
 
 
 QUOTES = (
-    Quote(f"{HOW_TO}/colours.md", "camera_curves", _camera_curves),
-    Quote(f"{EXPLANATION}/excitation_fit.md", "excitation_light", _light_errors),
+    Quote(f"{VALIDATION}/spectra.md", "camera_curves", _camera_curves),
+    Quote(f"{VALIDATION}/phosphors.md", "excitation_light", _light_errors),
     *quoted_examples.QUOTES,
     *quoted_decay_fit.QUOTES,
     *quoted_rendering.QUOTES,
     *quoted_samples.QUOTES,
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _charging),
     Quote(f"{EXPLANATION}/identifiability.md", "rate_information", _two_rates),
-    Quote(f"{EXPLANATION}/identifiability.md", "coverage_pipeline", _of_bound),
+    Quote(f"{VALIDATION}/decays.md", "coverage_pipeline", _of_bound),
     Quote(f"{EXPLANATION}/phosphorescence.md", "rate_information", _approached_table),
     Quote(f"{EXPLANATION}/phosphorescence.md", "rate_information", _approached_span),
-    Quote(f"{EXPLANATION}/linear_variable_filter.md", "lvf_in_the_room", _variable_filter),
-    Quote(f"{EXPLANATION}/linear_variable_filter.md", "spectrum_through_lvf", _white_reference),
-    Quote(f"{EXPLANATION}/from_raw_to_linear.md", "veiling_glare", _glare),
-    Quote(f"{EXPLANATION}/decay_fit.md", "reference_data", _certified),
+    Quote(f"{VALIDATION}/bench.md", "lvf_in_the_room", _variable_filter),
+    Quote(f"{VALIDATION}/spectra.md", "spectrum_through_lvf", _white_reference),
+    Quote(f"{VALIDATION}/decays.md", "veiling_glare", _glare),
+    Quote(f"{VALIDATION}/decays.md", "reference_data", _certified),
     Quote(f"{DECISIONS}/0011-least-squares.md", "reference_data", _certified),
     Quote(f"{DECISIONS}/0011-least-squares.md", "least_squares_starts", _starts),
     Quote(f"{DECISIONS}/0006-own-ptp.md", "gphoto2_latency", _release),
@@ -310,7 +310,7 @@ QUOTES = (
     ),
     *(
         Quote(
-            f"{EXPLANATION}/mixtures.md",
+            f"{VALIDATION}/mixtures.md",
             f"mixture_colours_{name.replace(', ', '_')}",
             _mixture_scale(row),
         )

@@ -1,11 +1,11 @@
-"""What the page on rendering says of its campaigns."""
+"""Figures of rendering on the page of the validation."""
 
 import re
 
 from tests.acceptance.printed import furthest, match, part, span
-from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
+from tests.acceptance.quote import VALIDATION, Quote
 
-PAGE = f"{EXPLANATION}/rendering.md"
+PAGE = f"{VALIDATION}/rendering.md"
 METHODS = ("fold, 24 bands", "1 wavelength", "4 wavelengths", "8 wavelengths")
 #: Cases and methods of the table, as the campaign and as the page call them.
 NOISE_ROWS = (
@@ -18,7 +18,6 @@ NOISE_ROWS = (
 )
 HISTORY = ("blue-paint, 1 state, κ/k at most 0.0001", "yellow-paint, 1 state, κ/k at most 0.0001")
 SATURATED = "blue-paint, glow of the law"
-DARK_ROOM = f"{HOW_TO}/render_dark_room.md"
 #: Samples and rooms, as the campaign and as the page call them.
 ROOMS = {
     "two-states": "two states, 0.08 and 0.016 /s",
@@ -186,12 +185,12 @@ def _must_not_agree(printed: str) -> str:
 
 
 QUOTES = (
-    Quote(DARK_ROOM, "dark_room", _rooms),
-    Quote(DARK_ROOM, "dark_room", _furthest_photograph),
-    Quote(DARK_ROOM, "fluorescent_room", _lamps),
-    Quote(DARK_ROOM, "fluorescent_room", _blue),
-    Quote(DARK_ROOM, "fluorescent_room", _reflected),
-    Quote(DARK_ROOM, "fluorescent_room", _must_not_agree),
+    Quote(PAGE, "dark_room", _rooms),
+    Quote(PAGE, "dark_room", _furthest_photograph),
+    Quote(PAGE, "fluorescent_room", _lamps),
+    Quote(PAGE, "fluorescent_room", _blue),
+    Quote(PAGE, "fluorescent_room", _reflected),
+    Quote(PAGE, "fluorescent_room", _must_not_agree),
     Quote(PAGE, "wavelength_noise", _noise),
     Quote(PAGE, "wavelength_noise", _bands),
     Quote(PAGE, "history_sampling", _history),

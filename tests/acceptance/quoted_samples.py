@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from tests.acceptance.printed import Extract, columns, furthest, match, span
-from tests.acceptance.quote import EXPLANATION, HOW_TO, Quote
+from tests.acceptance.quote import VALIDATION, Quote
 
 #: Middles of the LEDs' bands in nm that the page takes together, and those that it names.
 MAX_NM, NAMED_NM = (455, 495, 530, 565, 605), (640, 680, 415)
@@ -82,9 +82,9 @@ def _unequal_filling(printed: str) -> str:
     alike = counted("general order", "test", "not decided")
     return (
         f"Of {seeds:.0f} samples of two such states, charged for 10 s, 1 min and 10 min, "
-        f"{told or 'none'} is told as an order, where the exponents alone would tell {alone}; of "
-        f"{of_order:.0f} samples of general order {right} are told, and of {alike} the charges do "
-        "not differ enough to decide"
+        f"{told or 'none'} is given an order, where the exponents alone would give one to {alone}; "
+        f"of {of_order:.0f} samples of general order {right} are given one, and of {alike} the "
+        "charges do not differ enough to decide"
     )
 
 
@@ -134,13 +134,13 @@ def _budget(printed: str) -> str:
     )
 
 
-LIGHTS, WHOLE = f"{HOW_TO}/select_wavelengths.md", f"{HOW_TO}/whole_phosphor.md"
+PHOSPHORS = f"{VALIDATION}/phosphors.md"
 QUOTES = (
-    Quote(LIGHTS, "leds_by_camera", _leds_by_camera),
-    Quote(LIGHTS, "camera_filters", _camera_filters),
-    *(Quote(LIGHTS, "selected_lights", _selected_lights(way)) for way in WAYS),
-    Quote(f"{EXPLANATION}/identifiability.md", "unequal_filling", _unequal_filling),
-    Quote(f"{HOW_TO}/luminance.md", "luminance_budget", _budget),
-    Quote(WHOLE, "samples_in_turn", _lab_times),
-    Quote(WHOLE, "samples_in_turn", _in_turn),
+    Quote(PHOSPHORS, "leds_by_camera", _leds_by_camera),
+    Quote(f"{VALIDATION}/spectra.md", "camera_filters", _camera_filters),
+    *(Quote(PHOSPHORS, "selected_lights", _selected_lights(way)) for way in WAYS),
+    Quote(PHOSPHORS, "unequal_filling", _unequal_filling),
+    Quote(f"{VALIDATION}/luminance.md", "luminance_budget", _budget),
+    Quote(PHOSPHORS, "samples_in_turn", _lab_times),
+    Quote(PHOSPHORS, "samples_in_turn", _in_turn),
 )

@@ -5,7 +5,7 @@ from difflib import ndiff
 
 from tests.acceptance.campaigns import ROOT, Campaign, Output
 from tests.acceptance.printed import Extract
-from tests.acceptance.quote import Quote
+from tests.acceptance.quote import VALIDATION, Quote
 from tests.acceptance.quoted_figures import QUOTES
 from tests.acceptance.validation_figures import FIGURES
 from tests.acceptance.verdict import agrees
@@ -45,8 +45,10 @@ def _difference(published: str, measured: str) -> str:
 
 
 def renew_quotes(campaign: Campaign, published: Output, measured: Output) -> None:
-    """Write the new figures into README.md, and the new texts into the pages that quote them."""
-    texts = [("README.md", one.extract) for one in FIGURES if one.campaign == campaign.name]
+    """Write the new figures and the new texts into the pages that quote them."""
+    texts = [
+        (f"{VALIDATION}/index.md", one.extract) for one in FIGURES if one.campaign == campaign.name
+    ]
     texts += [(quote.page, quote.text) for quote in QUOTES if quote.campaign == campaign.name]
     for name, extract in texts:
         path = ROOT / name

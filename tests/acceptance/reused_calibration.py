@@ -7,7 +7,7 @@ The bench is calibrated once (`labrig run calibration`); every material is then 
 run phosphor`, which finds that calibration by itself. First what `labrig plan` says of both at the
 size of a 21-megapixel camera's frames. Then a line for each material, as of
 `tests.acceptance.whole_phosphor`, and the ΔE2000 of its photographs from the glow in the colour of
-its measured spectrum (`labrig compare`), mean and largest, with the mean that noise alone makes;
+its measured spectrum (`labrig reproduce`), mean and largest, with the mean that noise alone makes;
 then the root mean squares over all of them. `--keys` changes keys of one part of the chain, to see
 what they cost.
 """
@@ -81,8 +81,8 @@ def measured(
 
 
 def colours(run: Path) -> str:
-    """Return the colour differences of a run with one patch, as `labrig compare` tells them."""
-    (glow,) = json.loads(labrig("compare", run, "--json").stdout)["glow"].values()
+    """Return the colour differences of a run with one patch, as `labrig reproduce` tells them."""
+    (glow,) = json.loads(labrig("reproduce", run, "--json").stdout)["glow"].values()
     own = "1 state"
     return f"ΔE {glow['mean'][own]:.2f} ({glow['max'][own]:.2f}), noise {glow['noise']:.2f}"
 

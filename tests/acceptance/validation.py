@@ -7,11 +7,11 @@
     python -m tests.acceptance.validation quotes
 
 `run` runs campaigns, or all whose code has changed since they ran, keeps in `outputs/` what they
-print, makes `docs/validation.md` of it and renews what README.md and other pages quote. `turn` runs
-one part of the cheapest third, one part after another with the commits, and keeps nothing. Both
-print the figures that are no longer what was published, and then end with exit status 1. `stale`
-lists the campaigns whose code has changed; `table` makes the page anew; `quotes` prints what other
-pages should quote and do not.
+print, makes the pages of `docs/validation` of it and renews what other pages quote. `turn` runs one
+part of the cheapest third, one part after another with the commits, and keeps nothing. Both print
+the figures that are no longer what was published, and then end with exit status 1. `stale` lists
+the campaigns whose code has changed; `table` makes the pages anew; `quotes` prints what other pages
+should quote and do not.
 """
 
 import subprocess
@@ -21,7 +21,7 @@ from collections.abc import Iterable
 from tests.acceptance.campaigns import CAMPAIGNS, ROOT, Campaign
 from tests.acceptance.quoted_figures import QUOTES
 from tests.acceptance.renewal import changes, renew_quotes, says
-from tests.acceptance.validation_page import PAGE, page
+from tests.acceptance.validation_page import pages
 
 #: Processor time of the campaigns that CI runs in one turn, and the fraction that takes turns.
 TURN_CPU_S, CHEAP = 90.0, 1 / 3
@@ -68,8 +68,13 @@ def _run(campaigns: Iterable[Campaign], *, keep: bool) -> bool:
                 renew_quotes(campaign, published, measured)
         hold = hold and not changed
     if keep:
-        PAGE.write_text(page(), encoding="utf-8")
+        _write_pages()
     return hold
+
+
+def _write_pages() -> None:
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")
 
 
 def _print_quotes() -> None:
@@ -94,7 +99,7 @@ def main(arguments: list[str]) -> None:
             for one in stale:
                 print(one.name, one.kept.date if one.kept else "never", sep="  ")
         case ["table"]:
-            PAGE.write_text(page(), encoding="utf-8")
+            _write_pages()
         case ["quotes"]:
             _print_quotes()
         case _:

@@ -467,6 +467,12 @@ FIGURES = (
         figure.wrong,
     ),
     Figure(
+        "Runs of seven protocols and of a chain, cut off at 200 random moments as by `kill -9` and "
+        "resumed: the end that is announced at once against the true one, with choices as planned",
+        "announced_end",
+        figure.announced_end,
+    ),
+    Figure(
         "Lamp off after a signal or a closed terminal, 10 trials each",
         "lamp_off_however_it_ends",
         figure.off_after(r"(?!SIGSTOP|SIGSEGV)SIG[^ ]+|closed terminal|Ctrl-Z"),

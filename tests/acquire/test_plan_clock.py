@@ -3,7 +3,16 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import CameraCapabilities, Plan, PlanClock, Step
+from labrig.acquire import (
+    CameraCapabilities,
+    Plan,
+    PlanClock,
+    Step,
+    plan,
+    read_protocol,
+    read_rig_file,
+)
+from labrig.foundation import resources
 from labrig.record import PERSON
 
 STEPS = (
@@ -74,3 +83,14 @@ def test_a_step_by_hand_of_a_later_unit_is_announced() -> None:
     assert due is not None
     assert due.what == "take the card away"
     assert due.in_s == pytest.approx(790.0)
+
+
+def test_a_plan_counts_every_change_of_settings_as_the_rig_declares_it() -> None:
+    rig = read_rig_file(resources.find("config", "rig", "sim"))
+    protocol = read_protocol(resources.find("protocols", "protocol", "camera_calibration"))
+    camera = rig.devices["camera"].model_copy(update={"change_time": "100 ms"})
+    slow = rig.model_copy(update={"devices": {**rig.devices, "camera": camera}})
+    plain = plan(protocol, rig, "rig.yaml")
+    added_s = plan(protocol, slow, "rig.yaml").duration_s - plain.duration_s
+    assert added_s == pytest.approx(0.1 * round(added_s / 0.1))
+    assert plain.frames / 3 < added_s / 0.1 < plain.frames

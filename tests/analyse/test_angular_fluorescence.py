@@ -120,7 +120,7 @@ def test_views_that_are_missing_are_named_and_the_others_used(both: AnalysisCont
     untested = of_code(result.warnings, "views-untested")
     assert untested.subject == "horizontal under 365 nm"
     few = [attempt for attempt in attempts if attempt.unit.endswith(("before", "after"))]
-    with pytest.raises(DataError, match="the scatter cannot be told; go on with labrig resume"):
+    with pytest.raises(DataError, match="scatter cannot be estimated; go on with labrig resume"):
         analyse(replace(part, run=replace(part.run, attempts=few)))
     with pytest.raises(DataError, match="no view is complete"):
         analyse(replace(part, run=replace(part.run, attempts=[])))

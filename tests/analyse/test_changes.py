@@ -78,7 +78,7 @@ def test_a_result_that_says_nothing_of_itself(put: Put) -> None:
     old, new = put("old", made_with=None), put("new")
     (old / "fit.json").write_text("rubbish")
     assert changes(old, new) == (
-        "what the earlier one was made with is not recorded",
+        "the libraries of the earlier result are not recorded",
         "the numbers are the same; other in provenance.yaml",
     )
 

@@ -1,6 +1,5 @@
 """The emission spectrum of a simulated sample against the truth, and what it must not miss."""
 
-import csv
 import json
 import struct
 from dataclasses import replace
@@ -127,8 +126,8 @@ def test_a_result_and_its_files_are_read_back(
     assert found.provides() == {"spectra": {"": before.spectrum}}
     found.write_files(tmp_path)
     assert read_emission_spectrum(tmp_path / "emission.yaml") == before.spectrum
-    rows = list(csv.reader((tmp_path / "spectrum.csv").read_text().splitlines()))
-    assert [float(row[0]) for row in rows[1:]] == WAVELENGTH_NM.tolist()
+    table = found.csv_tables()["spectrum.csv"]
+    assert [float(row[0]) for row in table.rows] == WAVELENGTH_NM.tolist()
 
 
 def test_a_report_shows_all_comparisons(blue: Path, found: EmissionSpectrumResult) -> None:

@@ -39,7 +39,7 @@ MISTAKES: dict[str, tuple[dict[str, str], tuple[str, ...], tuple[str, ...]]] = {
     ),
     "two boards at a port": (
         {"rig.yaml": RIG + "  changer: {driver: text_changer, address: COM3}\n"}, PLAN,
-        ("are both at COM3", "labrig rig list"),
+        ("are both at COM3", "labrig rig devices"),
     ),
     "a misspelt key in a part": (
         {"own.yaml": "protocol: phosphor\nparts:\n - protocol: decay\n   chrge: 5 min\n"}, OWN,

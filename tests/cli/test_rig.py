@@ -1,4 +1,4 @@
-"""`labrig rig list` and `labrig rig check` on the simulated rig, well and badly set."""
+"""`labrig rig devices` and `labrig rig check` on the simulated rig, well and badly set."""
 
 import json
 from collections.abc import Callable
@@ -206,10 +206,10 @@ def test_a_rig_that_does_not_exist(labrig: Labrig) -> None:
 
 
 def test_listing_needs_no_device(labrig: Labrig) -> None:
-    ended = labrig("rig", "list")
+    ended = labrig("rig", "devices")
     assert ended.code == 0
     assert "serial ports:" in ended.out
-    found = json.loads(labrig("rig", "list", "--json").out)
+    found = json.loads(labrig("rig", "devices", "--json").out)
     assert set(found) == {"ports", "cameras", "spectrometers", "notes"}
 
 
@@ -223,7 +223,7 @@ def test_what_is_listed_is_a_rig_file(
         ports.append(port)
     around = Host("linux", lambda: ports, tuple, tuple)
     monkeypatch.setattr(Host, "of_this_pc", lambda: around)
-    out = labrig("rig", "list").out
+    out = labrig("rig", "devices").out
     path = tmp_path / "rig.yaml"
     path.write_text(out[out.index("name:") :])
     rig = read_rig_file(path)

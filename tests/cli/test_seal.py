@@ -223,6 +223,13 @@ def test_a_damaged_signature_is_refused_in_a_line(
     assert len(str(refused.value).splitlines()) == 1
 
 
+def test_an_armour_has_nothing_beside_its_ends(signed: tuple[bytes, str]) -> None:
+    message, text = signed
+    for damaged in (text.replace("-----END", "0\t-----END"), text.replace("E-----\n", "E-----0\n")):
+        with pytest.raises(DataError):
+            signer_of(message, damaged)
+
+
 @given(st.text(max_size=60) | st.binary(max_size=60))
 def test_a_file_that_has_no_keys_is_refused(
     tmp_path_factory: pytest.TempPathFactory, content: str | bytes

@@ -1,4 +1,4 @@
-"""`labrig compare` of a run on the simulated rig."""
+"""`labrig reproduce` of a run on the simulated rig."""
 
 import contextlib
 import io
@@ -74,7 +74,7 @@ def as_edited(run: Path) -> None:
 
 
 def compared(labrig: Labrig, run: Path, *more: object) -> dict[str, Any]:
-    ended = labrig("compare", run, "--json", *more)
+    ended = labrig("reproduce", run, "--json", *more)
     assert (ended.code, ended.err) == (0, "")
     said: dict[str, Any] = json.loads(ended.out)
     return said
@@ -108,7 +108,7 @@ def test_white_and_normalisation_are_used_and_reported(labrig: Labrig, run: Path
 
 @pytest.mark.drawn
 def test_it_tells_a_person_and_draws(labrig: Labrig, run: Path, tmp_path: Path) -> None:
-    ended = labrig("compare", run, "--material", "double-wide", "--figures", tmp_path / "drawn")
+    ended = labrig("reproduce", run, "--material", "double-wide", "--out", tmp_path / "drawn")
     assert (ended.code, ended.err) == (0, "")
     for said in ("CIEDE2000", "5.46 (10.64)", "The paper does not say", "k_e was not measured"):
         assert said in " ".join(ended.out.split())
@@ -130,7 +130,7 @@ def test_it_tells_a_person_and_draws(labrig: Labrig, run: Path, tmp_path: Path) 
 def test_bad_input_is_one_clear_line(
     labrig: Labrig, run: Path, options: list[str], code: int, said: str
 ) -> None:
-    ended = labrig("compare", run, *options)
+    ended = labrig("reproduce", run, *options)
     assert (ended.code, len(ended.err.splitlines())) == (code, 1)
     assert said in ended.err
 
@@ -138,15 +138,15 @@ def test_bad_input_is_one_clear_line(
 def test_a_run_without_a_sound_result_is_one_clear_line(
     labrig: Labrig, run: Path, tmp_path: Path
 ) -> None:
-    assert labrig("compare", tmp_path / "nothing").code == 2
+    assert labrig("reproduce", tmp_path / "nothing").code == 2
     copy = tmp_path / "copy"
     shutil.copytree(run, copy)
     (copy / "result" / "fit.json").write_text('{"offsets": 3}')
-    damaged = labrig("compare", copy)
+    damaged = labrig("reproduce", copy)
     assert (damaged.code, len(damaged.err.splitlines())) == (4, 1)
     assert "labrig process" in damaged.err
     shutil.rmtree(copy / "result")
-    bare = labrig("compare", copy)
+    bare = labrig("reproduce", copy)
     assert (bare.code, len(bare.err.splitlines())) == (4, 1)
     assert "labrig process" in bare.err
 

@@ -44,7 +44,7 @@ def test_one_of_another_result_is_not_shown_but_named(run: Path) -> None:
     (run / "result" / "result.json").write_text('{"k": 1}')
     assert include_comparison(run, run / "result")
     assert "agree." not in page(run)
-    assert f"labrig compare {run.name} --rendered" in page(run)
+    assert f"labrig reproduce {run.name} --rendered" in page(run)
 
 
 def test_a_page_without_a_place_for_it_stays_as_it_is(run: Path) -> None:

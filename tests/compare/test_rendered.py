@@ -1,4 +1,4 @@
-"""`labrig compare --rendered`: the dark room rendered beside the simulated camera's photographs."""
+"""`labrig reproduce --rendered`: the dark room rendered beside the simulated photographs."""
 
 import contextlib
 import io
@@ -123,7 +123,7 @@ def measured(run: Path) -> Path:
 
 
 def rendered(labrig: Labrig, run: Path, *more: object) -> dict[str, Any]:
-    ended = labrig("compare", run, "--rendered", "--json", *more)
+    ended = labrig("reproduce", run, "--rendered", "--json", *more)
     assert (ended.code, ended.err) == (0, "")
     comparison: dict[str, Any] = json.loads(ended.out)["rendered"]
     return comparison
@@ -256,12 +256,12 @@ def test_the_lamps_fade_is_the_measured_one(measured: Path) -> None:
 def test_what_was_not_measured_is_one_clear_line(labrig: Labrig, measured: Path) -> None:
     bare = of_the_room().model_copy(update={"albedo": None})
     write_material(measured / "result" / "material.yaml", bare)
-    ended = labrig("compare", measured, "--rendered", "--json")
+    ended = labrig("reproduce", measured, "--rendered", "--json")
     assert (ended.code, len(ended.err.splitlines())) == (2, 1)
     assert "--assume-albedo" in ended.err
     absolute = of_the_room().model_copy(update={"scale": "absolute"})
     write_material(measured / "result" / "material.yaml", absolute)
-    ended = labrig("compare", measured, "--rendered", "--json")
+    ended = labrig("reproduce", measured, "--rendered", "--json")
     assert (ended.code, len(ended.err.splitlines())) == (2, 1)
     assert "luxmeter" in ended.err
     unlit = bare.model_copy(
@@ -270,13 +270,13 @@ def test_what_was_not_measured_is_one_clear_line(labrig: Labrig, measured: Path)
         }
     )
     write_material(measured / "result" / "material.yaml", unlit)
-    ended = labrig("compare", measured, "--rendered", "--json")
+    ended = labrig("reproduce", measured, "--rendered", "--json")
     assert (ended.code, len(ended.err.splitlines())) == (2, 1)
     assert "emission spectrum" in ended.err
 
 
 def test_assumptions_without_a_rendering_are_refused(labrig: Labrig, run: Path) -> None:
-    ended = labrig("compare", run, "--assume-scale", 1)
+    ended = labrig("reproduce", run, "--assume-scale", 1)
     assert (ended.code, len(ended.err.splitlines())) == (2, 1)
     assert "--rendered" in ended.err
 
@@ -285,7 +285,7 @@ def test_assumptions_without_a_rendering_are_refused(labrig: Labrig, run: Path) 
 def test_the_assumption_is_in_the_picture(labrig: Labrig, measured: Path, tmp_path: Path) -> None:
     bare = of_the_room().model_copy(update={"albedo": None})
     write_material(measured / "result" / "material.yaml", bare)
-    ended = labrig("compare", measured, "--rendered", "--assume-albedo", 0.5, "--figures", tmp_path)
+    ended = labrig("reproduce", measured, "--rendered", "--assume-albedo", 0.5, "--out", tmp_path)
     assert (ended.code, ended.err) == (0, "")
     assert "assumed to be 0.5 at all wavelengths" in " ".join(ended.out.split())
     assert {"rendered.png", "rendered-one-exposure.png", "rendered.csv"} <= {

@@ -1,4 +1,4 @@
-"""`labrig compare --rendered` of fluorescent samples under the lamps of the simulated bench."""
+"""`labrig reproduce --rendered` of fluorescent samples under the lamps of the simulated bench."""
 
 import csv
 import json
@@ -110,15 +110,15 @@ def test_it_is_printed_for_programs_and_the_report_shows_it_while_it_is_of_its_r
     labrig: Labrig, run: Path
 ) -> None:
     report = run / "result" / "report.html"
-    ended = labrig("compare", run, "--rendered", "--json")
+    ended = labrig("reproduce", run, "--rendered", "--json")
     assert (ended.code, ended.err) == (0, "")
     lamps = json.loads(ended.out)["rendered"]["lamps"]
     assert list(lamps) == ["daylight", "blue", "ultraviolet"]
     assert "photographed and rendered" not in report.read_text()
-    ended = labrig("compare", run, "--rendered")
+    ended = labrig("reproduce", run, "--rendered")
     assert (ended.code, ended.err) == (0, "")
     assert "photographed and rendered" in report.read_text()
-    assert "labrig compare" in report.read_text()
+    assert "labrig reproduce" in report.read_text()
     again = process_and_report(run)
     assert again.changes == ("the same result as before",)
     assert "photographed and rendered" in report.read_text()
@@ -159,6 +159,6 @@ def test_what_cannot_be_compared_is_one_clear_line(
     labrig: Labrig, tmp_path: Path, protocol: str, options: list[str], said: str
 ) -> None:
     (tmp_path / "protocol.yaml").write_text(f"protocol: {protocol}\n")
-    ended = labrig("compare", tmp_path, *options)
+    ended = labrig("reproduce", tmp_path, *options)
     assert (ended.code, len(ended.err.splitlines())) == (2, 1)
     assert said in ended.err

@@ -1,4 +1,4 @@
-"""docs/validation.md is what its script makes of what the campaigns printed."""
+"""The pages docs/validation are what their script makes of what the campaigns printed."""
 
 import re
 
@@ -10,26 +10,49 @@ from tests.acceptance.quoted_figures import QUOTES
 from tests.acceptance.renewal import changes, renewed, says
 from tests.acceptance.sources import digest
 from tests.acceptance.validation import TURN_CPU_S, turns
+from tests.acceptance.validation_areas import all_names
 from tests.acceptance.validation_figures import FIGURES, Figure
-from tests.acceptance.validation_page import PAGE, page
+from tests.acceptance.validation_page import PAGES, TEMPLATES, pages
 from tests.acceptance.verdict import agrees
 
 KEPT = {name: output for name, one in CAMPAIGNS.items() if (output := one.kept) is not None}
 
 
-def test_the_page_is_made_of_what_is_kept() -> None:
-    assert PAGE.read_text(encoding="utf-8") == page()
+def test_the_pages_are_made_of_what_is_kept() -> None:
+    made = pages()
+    assert set(PAGES.iterdir()) == made.keys()
+    assert {path for path in made if path.read_text(encoding="utf-8") != made[path]} == set()
 
 
-def test_the_readme_tells_figures_of_the_page() -> None:
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    section = readme.split("## How good is it")[1].split("\n## ")[0]
-    told = [
-        row.split(" | ")[1].removesuffix(" |") for row in re.findall(r"^\|.* \|$", section, re.M)
+def test_each_campaign_has_one_area() -> None:
+    assert sorted(all_names()) == sorted(CAMPAIGNS)
+
+
+def test_the_first_page_has_figures_of_the_others() -> None:
+    index = (TEMPLATES / "index.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| .* \| (.*) \| .* \|$", index, re.M)
+    extracted = {one.extract(KEPT[one.campaign].printed) for one in FIGURES if one.campaign in KEPT}
+    assert len(rows) > 5
+    assert set(rows[1:]) <= extracted
+
+
+USER_PAGES = [
+    *("README.md", "docs/tutorial.md", "docs/index.md"),
+    *(f"docs/{kind}/*.md" for kind in ("how-to", "explanation")),
+]
+
+
+def test_pages_for_users_name_no_test_commands() -> None:
+    """Figures of tests, and how to repeat them, stand on the pages of the validation."""
+    named = [
+        f"{path.name}: {match[0]}"
+        for pattern in USER_PAGES
+        for path in ROOT.glob(pattern)
+        for match in re.finditer(
+            r"tests\.acceptance|\btests/\w+/\w+\.py|pytest [-\w]|\b\d+ seeds", path.read_text("utf-8")
+        )
     ]
-    found = {one.extract(KEPT[one.campaign].printed) for one in FIGURES if one.campaign in KEPT}
-    assert len(told) > 5
-    assert set(told[1:]) <= found
+    assert named == []
 
 
 def test_what_is_kept_belongs_to_a_campaign_and_says_how_it_was_made() -> None:

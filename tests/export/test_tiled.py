@@ -52,7 +52,7 @@ def test_the_server_has_every_frame_and_the_result(finished: Finished, client: A
         assert list(frames.sha256.values) == [f.sha256 for f in attempt.frames]
         assert list(frames.start_time.values) == [f.start_time for f in attempt.frames]
     result = client[finished.folder.name].read()
-    assert result.identical(labrig.read_dataset(finished.folder))
+    assert result.identical(labrig.read_result(finished.folder).to_xarray())
 
 
 @needs_server
@@ -82,5 +82,5 @@ def test_without_the_package_it_says_what_to_install(
     finished: Finished, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "bluesky_tiled_plugins", None)
-    with pytest.raises(UsageError, match="pip install bluesky-tiled-plugins"):
+    with pytest.raises(UsageError, match=r"pip install 'labrig\[tiled\]'"):
         labrig.to_tiled(finished.folder, client=None)

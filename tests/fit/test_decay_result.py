@@ -212,7 +212,7 @@ def test_impossible_data_are_refused(arguments: tuple[Any, Any, Any], message: s
         ({"n_states": 1, "fixed_rates": [0.1, 0.2]}, "expected 2 states or more"),
         ({"fixed_rates": [-1.0]}, "fixed rates > 0"),
         ({"flicker": -0.1}, r"flicker in \[0, 1\)"),
-        ({"flicker": None, "sigma": None}, "to tell flicker"),
+        ({"flicker": None, "sigma": None}, "to separate flicker"),
         ({"flicker": None, "t_s": T[:5], "values": GOOD[:5]}, "to estimate flicker"),
         ({"offset_sigma": -1.0}, "σ of the offset ≥ 0"),
         ({"offset_sigma": np.nan}, "σ of the offset ≥ 0"),

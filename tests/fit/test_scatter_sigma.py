@@ -83,7 +83,7 @@ def test_a_few_values_without_sigma_leave_the_rate_open() -> None:
 
 
 def test_flicker_needs_sigma() -> None:
-    with pytest.raises(FitError, match="to tell flicker from other noise"):
+    with pytest.raises(FitError, match="to separate flicker from other noise"):
         fit_decay(T_S, np.exp(-0.03 * T_S), None, flicker=0.007)
 
 

@@ -90,13 +90,13 @@ def test_rates_of_no_thermal_release_have_a_warning(
 @pytest.mark.parametrize(
     ("celsius", "rate", "sigma", "told"),
     [
-        ([20.0], [0.1], [0.01], "rates at two temperatures"),
+        ([20.0], [0.1], [0.01], "at two temperatures"),
         ([20.0, 21.0], [0.1, 0.11], [0.01, 0.01], "differ by 2 K"),
         ([20.0, 30.0], [0.1, -0.1], [0.01, 0.01], "above 0, got -0.1"),
         ([20.0, 30.0], [0.1, 0.2], [0.01, 0.0], "above 0, got 0.2 ± 0"),
         ([20.0, np.nan], [0.1, 0.2], [0.01, 0.01], "above −273.15"),
         ([20.0, -300.0], [0.1, 0.2], [0.01, 0.01], "above −273.15"),
-        ([20.0, 30.0, 40.0], [0.1, 0.2], [0.01, 0.01], "got 3 temperatures and 2 rates"),
+        ([20.0, 30.0, 40.0], [0.1, 0.2], [0.01, 0.01], "got 3 of a temperature, 2 of a rate"),
     ],
 )
 def test_what_tells_no_depth_is_refused(

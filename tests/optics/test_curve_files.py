@@ -64,7 +64,7 @@ def test_a_camera_of_ones_own(tmp_path: Path) -> None:
     [
         ("", "nothing in it"),
         ("# only\n", "nothing in it"),
-        ("time,a\n400,1\n500,2\n", "expected an axis of wavelengths, got 'time'"),
+        ("time,a\n400,1\n500,2\n", "expected a column of wavelengths, got 'time'"),
         ("colour,a\n400,1\n500,2\n", "expected a column of wavelengths"),
         ("400,1,2\n500,1,2\n", "got 3 columns"),
         ("wavelength_nm,a,a\n400,1,2\n500,1,2\n", "'a' stands twice"),

@@ -196,7 +196,7 @@ def test_a_plan_without_a_material_is_the_timeline_for_programs_too(labrig: Labr
         ("states: []", [], "states"),
         ("states: [{k_r_per_s: 0.1}, {k_r_per_s: 0.01}]", [], "'amplitude' or 'reradiation'"),
         ("states: [{k_r_per_s: 0.1}, {k_r_per_s: 0.1}]", [], "same rate"),
-        ("power-law", [], "no decay tells so many apart"),
+        ("power-law", [], "no decay resolves so many"),
         ("blu-paint", [], "did you mean 'blue-paint'?"),
         ("smaple=blue-paint", [], "did you mean 'sample'?"),
         ("blue-paint", ["--predict", "red-paint"], "one material for each patch"),

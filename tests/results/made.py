@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from labrig.export import tree_of
 from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.results import DecayState, FittedDecay, RunResult
 
@@ -57,7 +56,9 @@ def assert_read_back(result: RunResult) -> None:
     """
     again = type(result).from_dict(json.loads(result.to_json(), parse_constant=_no_number))
     _assert_same(result, again, result.kind)
-    assert tree_of(again).to_dict()
+    assert again.to_xarray().to_dict()
+    assert len(again.to_pandas("values"))
+    assert again._repr_html_()
     cell = DocTestParser().get_examples(type(result).__doc__ or "")[1:]
     with redirect_stdout(StringIO()) as printed:
         exec("".join(example.source for example in cell), {"result": again})

@@ -19,6 +19,10 @@ assert abs(result.drift.value) < 1e-3, result.drift
 assert result.change_sigmas is None
 assert "plain board, relay 0" in (first / "result" / "report.html").read_text(encoding="utf-8")
 assert DRIFT_KIND.read(first).drift_per_s == result.drift.value
+# A notebook shows it as it shows labrig's own.
+assert "drift" in result._repr_html_()
+assert result.plot().axes[0].get_xlabel() == "Time / s"
+assert result.refit().drift == result.drift
 later = labrig.read_result(second)
 assert isinstance(later, LampDriftResult)
 assert later.change_sigmas is not None

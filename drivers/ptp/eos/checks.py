@@ -58,7 +58,7 @@ def _exposure_mode(state: EosState, *, wants_bulb: bool, has_bulb: bool) -> Iter
         )
         return
     if mode is None:
-        yield Finding("warn", "the camera does not tell its exposure mode", "turn its dial to M")
+        yield Finding("warn", "the camera does not report its exposure mode", "turn its dial to M")
     elif mode != MANUAL_EXPOSURE:
         at = _DIAL.get(mode, f"mode {mode}")
         yield Finding("refuse", f"its dial is at {at}: it chooses exposures", "turn it to M")
@@ -74,7 +74,7 @@ def _exposure_mode(state: EosState, *, wants_bulb: bool, has_bulb: bool) -> Iter
 
 def _focus(mode: int | None) -> Finding:
     if mode is None:
-        return Finding("warn", "the camera does not tell its focus mode", "set its lens to MF")
+        return Finding("warn", "the camera does not report its focus mode", "set its lens to MF")
     if mode != MANUAL_FOCUS:
         return Finding(
             "refuse",
@@ -87,7 +87,7 @@ def _focus(mode: int | None) -> Finding:
 def _iso_in_force(code: int | None, native: NativeIsos) -> Finding:
     where = f"ISO button above the display, one of {_listed(native.values)}"
     if code is None:
-        return Finding("warn", "the camera does not tell its ISO", where)
+        return Finding("warn", "the camera does not report its ISO", where)
     if code == AUTO_ISO:
         return Finding("refuse", "automatic ISO is on: gain may change between frames", where)
     if ISOS.get(code) not in native.values:
@@ -104,7 +104,7 @@ def _native_isos(native: NativeIsos, model: str) -> Iterator[Finding]:
             "warn",
             f"which ISOs of a {model or 'camera without a name'} are native is not known: {listed} "
             "is assumed",
-            "write what you know into the camera's 'isos' in the rig file",
+            "write the ISOs that you know into the camera's 'isos' in the rig file",
         )
     model_isos = isos_of_model(model)
     foreign = sorted(set(native.values) - set(model_isos.values))
@@ -127,7 +127,7 @@ def _auto_power_off(after_s: int | None) -> Finding:
     where = "Set-up 1 (yellow) → Auto power off → Off"
     if after_s is None:
         return Finding(
-            "warn", "the camera does not tell when it switches itself off", f"{_BY_HAND}: {where}"
+            "warn", "the camera does not report when it switches itself off", f"{_BY_HAND}: {where}"
         )
     if after_s in NEVER_OFF:
         return Finding("fine", "auto power off is off")

@@ -81,6 +81,7 @@ class EosExposure:
             isos=tuple(isos),
             f_numbers=tuple(sorted(f_numbers)),
             overhead_s=self._settings.frame_time,
+            change_s=self._settings.change_time,
             frame_bytes=frame_bytes(self._settings.frame_size, self._settings.frame_pixels),
             frame_pixels=self._settings.frame_pixels,
         )
@@ -136,8 +137,9 @@ class EosExposure:
             missing = "shutter time" if shutter is None else "ISO"
             dial = "B" if shutter is None and requested.exposure_s >= MIN_BULB_S else "M"
             raise DeviceError(
-                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
-                f"what 'labrig rig check' shows, or turn its dial to {dial}"
+                f"asked the camera for {requested}, and it does not offer this {missing}: choose "
+                "one of "
+                f"those that 'labrig rig check' shows, or turn its dial to {dial}"
             )
         # a dial at B leaves no shutter time to be set
         codes = {} if self._dial_is_at_b else {Property.shutter_time: shutter}

@@ -155,7 +155,7 @@ def _needs(properties: StandardProperties) -> Iterator[Finding]:
             yield Finding("fine", need.fine)
     if untold:
         yield Finding(
-            "warn", f"the camera does not tell whether it is set to {', '.join(untold)}", "look"
+            "warn", f"the camera does not report whether it is set to {', '.join(untold)}", "look"
         )
 
 
@@ -166,12 +166,12 @@ def _iso(
     listed = ", ".join(map(str, native.values))
     if described is None and len(native.values) == 1:
         yield Finding(
-            "warn", f"the camera does not tell its ISO; the rig file says {listed}", "look at it"
+            "warn", f"the camera does not report its ISO; the rig file says {listed}", "look at it"
         )
     elif described is None:
         yield Finding(
             "refuse",
-            "the camera does not tell its ISO",
+            "the camera does not report its ISO",
             "set it by hand, and write that one alone into the rig file's 'isos'",
         )
     elif described.value == AUTO_ISO:
@@ -185,13 +185,13 @@ def _iso(
             "warn",
             f"which ISOs of a {model or 'camera without a name'} are native is not known: {listed} "
             "is assumed",
-            "write what you know into the camera's 'isos' in the rig file",
+            "write the ISOs that you know into the camera's 'isos' in the rig file",
         )
 
 
 def _shutter(described: PropertyDescription | None) -> Iterator[Finding]:
     if described is None:
-        yield Finding("refuse", "the camera does not tell its shutter time", "use another camera")
+        yield Finding("refuse", "the camera does not report its shutter time", "use another camera")
         return
     listed = [units for units in described.settable_to(()) if units >= MIN_UNITS]
     if not described.is_settable:
@@ -224,7 +224,7 @@ def _formats(formats: Collection[int]) -> Finding:
     if formats and not any(can_be_raw(code) for code in formats):
         return Finding("refuse", f"it photographs in no RAW format (it lists {listed})", remedy)
     return Finding(
-        "warn", "PTP does not tell whether it is set to RAW; the first frame will", remedy
+        "warn", "PTP does not report whether it is set to RAW; the first frame will", remedy
     )
 
 

@@ -73,6 +73,7 @@ class StandardExposure:
             isos=tuple(sorted(isos)),
             f_numbers=tuple(sorted(self._f_number_choices(self._aperture()))),
             overhead_s=self._settings.frame_time,
+            change_s=self._settings.change_time,
             frame_bytes=frame_bytes(self._settings.frame_size, self._settings.frame_pixels),
             frame_pixels=self._settings.frame_pixels,
         )
@@ -95,8 +96,9 @@ class StandardExposure:
         if units is None or requested.iso not in self._iso_choices(iso):
             missing = "shutter time" if units is None else "ISO"
             raise DeviceError(
-                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
-                "what 'labrig rig check' shows, or set it to manual exposure"
+                f"asked the camera for {requested}, and it does not offer this {missing}: choose "
+                "one of "
+                "those that 'labrig rig check' shows, or set it to manual exposure"
             )
         self._set(StandardProperty.exposure_time, shutter, units, requested)
         if iso is not None:
@@ -134,7 +136,7 @@ class StandardExposure:
         shutter = self._properties.describe(StandardProperty.exposure_time)
         if shutter is None:
             raise DeviceError(
-                f"expected a camera that tells its {StandardProperty.exposure_time}, this one "
+                f"expected a camera that reports its {StandardProperty.exposure_time}, this one "
                 "does not: use another camera"
             )
         return shutter
@@ -157,7 +159,7 @@ class StandardExposure:
             return [listed for listed in iso.settable_to(self._isos) if listed in self._isos]
         if len(self._isos) != 1:
             raise DeviceError(
-                f"expected a camera that tells its {StandardProperty.exposure_index}, this one "
+                f"expected a camera that reports its {StandardProperty.exposure_index}, this one "
                 "does not: set it by hand, and write that one alone into the rig file's 'isos'"
             )
         return self._isos
@@ -181,7 +183,7 @@ class StandardExposure:
                     f"its lens offers {', '.join(f'f/{number:g}' for number in offered)}: choose "
                     "one of these"
                     if offered
-                    else "it does not tell the aperture of its lens: set it by hand and leave "
+                    else "it does not report the aperture of its lens: set it by hand and leave "
                     "f_number out"
                 )
             )

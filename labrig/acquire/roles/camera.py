@@ -28,8 +28,8 @@ SHORT_S, LONG_S = 1 / 60, 2.0
 SETTLING_S = 0.5
 #: Sensitivity at which both read noise and dark current are visible.
 ISO = 400
-#: Step to which suggested times are rounded up, so that plans are met.
-STEP_S = 0.1
+#: Steps to which suggested times are rounded up, so that plans are met.
+STEP_S, CHANGE_STEP_S = 0.1, 1e-3
 
 
 @runtime_checkable
@@ -83,7 +83,7 @@ class PlannedCamera(PlannedDevice):
     ) -> None:
         self._clock = clock
         self._offers = capabilities
-        self._pace = pace or Pace(capabilities.overhead_s)
+        self._pace = pace or Pace(capabilities.overhead_s, capabilities.change_s)
         self._settings: ExposureSettings | None = None
 
     def capabilities(self) -> CameraCapabilities:
@@ -137,13 +137,13 @@ def exercise_camera(camera: Camera, context: ExerciseContext) -> Exercised:
         If the camera failed, or its frame cannot be reduced.
     """
     capabilities = camera.capabilities()
-    measured, suggestion = _timing(camera, capabilities, context)
+    measured, suggestions = _timing(camera, capabilities, context)
     frame, _ = _shoot(camera, _settings(capabilities, LONG_S), context)
     reduced = context.frame_reader.dark_frame(frame)
     return Exercised(
         (_measured_offers(capabilities), *measured, *reduced.measured),
         reduced.findings,
-        (suggestion, *reduced.suggestions, *_offers(capabilities)),
+        (*suggestions, *reduced.suggestions, *_offers(capabilities)),
     )
 
 
@@ -156,21 +156,32 @@ def _offers(capabilities: CameraCapabilities) -> Iterator[Suggestion]:
 
 def _timing(
     camera: Camera, capabilities: CameraCapabilities, context: ExerciseContext
-) -> tuple[list[Measured], Suggestion]:
+) -> tuple[list[Measured], list[Suggestion]]:
     settings = _settings(capabilities, SHORT_S)
-    lags_s, cycles_s = [], []
+    lags_s, cycles_s, changes_s = [], [], []
     for _ in range(SHORT_FRAMES):
         frame, requested_s = _shoot(camera, settings, context)
         camera.arm()  # only now can the next exposure begin
         lags_s.append(frame.start_s - requested_s)
         cycles_s.append(context.clock.now() - frame.end_s)
-    frame_time_s = math.ceil(max(cycles_s) / STEP_S) * STEP_S
+    for exposure_s in (LONG_S, SHORT_S):
+        began_s = context.clock.now()
+        camera.configure(_settings(capabilities, exposure_s))
+        changes_s.append(context.clock.now() - began_s)
     return [
         Measured(
             "release asked to exposure begun, with the rig file's shutter_lag", spread_ms(lags_s)
         ),
         Measured("exposure over to ready for the next", spread_ms(cycles_s)),
-    ], Suggestion("frame_time", duration_text(frame_time_s))
+        Measured("change of the exposure time", spread_ms(changes_s)),
+    ], [
+        Suggestion("frame_time", duration_text(_rounded_up(max(cycles_s), STEP_S))),
+        Suggestion("change_time", duration_text(_rounded_up(max(changes_s), CHANGE_STEP_S))),
+    ]
+
+
+def _rounded_up(time_s: float, step_s: float) -> float:
+    return math.ceil(time_s / step_s) * step_s
 
 
 def _shoot(

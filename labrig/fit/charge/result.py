@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.number_format import aligned
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 from labrig.results import Measured, OneSided, ProfileInterval, interval_lines, measured_number
@@ -100,7 +101,7 @@ class FittedReadings:
 
 
 @dataclass(frozen=True)
-class ChargeFit:
+class ChargeFit(NotebookViews):
     """Charge and decay of one series, fitted with states of one kinetic order each.
 
     Attributes
@@ -171,7 +172,7 @@ class ChargeFit:
             f"{_text(self.prompt)}, dark level {_text(self.dark)}"
         )
         if self.is_any_one_sided:
-            lines.append("<, >: at a bound of what is possible, limit of 95 % probability")
+            lines.append("<, >: at a bound of the possible values, limit of 95 % probability")
         lines += interval_lines(self.named_intervals)
         lines += aligned(self.model_rows())
         return "\n".join(lines)

@@ -315,8 +315,8 @@ def small_chi2_warnings(chi2: float, dof: float, sigma_from_scatter: bool) -> li
             Undetermined(
                 "sigma-upper-bound",
                 "the values lie {factor:2r} times closer to the fit than σ implies: their scatter "
-                "is below what the curve resolves against which σ was measured, and every σ given "
-                "here is an upper bound; give the values' σ if you have it",
+                "is too small for the curve that measures it, and every σ here is an upper bound; "
+                "give the values' σ if you have it",
                 factor=factor,
             )
         ]
@@ -526,7 +526,7 @@ def state_warnings(
             Undetermined(
                 "offset-unresolved",
                 "the data hardly resolve the free offset from the slowest state: give the offset "
-                "(labrig fit decay --offset zero, or the σ of what was subtracted) or record "
+                "(labrig fit decay --offset zero, or the σ of the subtracted level) or record "
                 "longer",
                 sigma_percent=100 * sigma[-1],
             )

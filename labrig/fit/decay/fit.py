@@ -270,7 +270,7 @@ def _numbers_of_states(
     if most > MAX_STATES:
         raise FitError(
             f"expected at most {MAX_STATES} states, got {most}; "
-            "no decay tells more apart: a power law may be what you see"
+            "no decay resolves more; it may follow a power law"
         )
     frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
 
@@ -292,7 +292,7 @@ def _numbers_of_states(
 def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
     if flicker != 0 and not series.sigma_given:
         raise FitError(
-            "expected σ of the values to tell flicker from other noise, got none; "
+            "expected σ of the values to separate flicker from other noise, got none; "
             "give σ, or set the flicker to 0"
         )
     if flicker is None and series.n_frames < MIN_FOR_FLICKER:

@@ -438,8 +438,8 @@ def warnings_about(
             Disturbance(
                 "noise-correlated",
                 "the noise of neighbouring values correlates (by {correlation:.1f}): σ allows for "
-                "it, it is up to {factor:.2g} times as large as for independent values; find what "
-                "drifts, or measure a steady light beside the sample",
+                "it, and is up to {factor:.2g} times as large as for independent values; find the "
+                "drift, or measure a steady light beside the sample",
                 correlation=correlation.correlation,
                 factor=correlation.factor,
             )

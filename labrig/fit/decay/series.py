@@ -214,8 +214,8 @@ def decay_series(
         raise FitError(f"expected exposures ≥ 0, got {exposure.min():g} s; give their lengths")
     if t.min() < 0 <= t.max():
         raise FitError(
-            f"expected all times after lamp off, at 0 s, got {t.min():g} s; leave out what was "
-            "before it, or count the time from when the lamp went off"
+            f"expected all times after lamp off, at 0 s, got {t.min():g} s; leave out the "
+            "frames before it, or count the time from when the lamp went off"
         )
     order = np.argsort(t, kind="stable")
     span = float(t.max() - t.min())

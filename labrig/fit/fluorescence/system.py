@@ -513,8 +513,8 @@ def require_scale(system: FluorescenceSystem) -> None:
     """Raise UsageError if there are fewer than two lights, or none has a known brightness."""
     if len(system.exposures) < 2:
         raise UsageError(
-            f"expected two or more lights, got {len(system.exposures)}: one light tells nothing of "
-            "what others excite; photograph the surface under more"
+            f"expected two or more lights, got {len(system.exposures)}: one light does not show "
+            "the light that others excite; photograph the surface under others"
         )
     if system.is_loose.all():
         raise UsageError(

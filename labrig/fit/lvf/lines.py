@@ -375,7 +375,7 @@ def locate_lines(
         unexplained = [1 - orientation.explained for orientation in located]
         if unexplained[1] < CLEARLY * unexplained[0] and rising is None:
             raise FitError(
-                "the lines fit either way round, and without colours nothing tells which is right; "
+                "the lines fit either way round, and without colours neither can be excluded; "
                 "say whether the wavelength rises along the strip"
             )
         if unexplained[1] < CLEARLY * unexplained[0]:

@@ -4,6 +4,7 @@ import json
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.material import ReradiationMixture
 
 
@@ -73,7 +74,7 @@ class MixtureCandidate:
 
 
 @dataclass(frozen=True, eq=False)
-class MixtureFit:
+class MixtureFit(NotebookViews):
     """A mixture that stands for a re-radiation matrix.
 
     Attributes

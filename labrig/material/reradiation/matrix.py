@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.foundation.arrays import BoolArray, FloatArray
+from labrig.foundation.notebook_views import NotebookViews
 from labrig.optics import Spectrum, edges_from_centres
 
 #: Unit of the re-radiation; `relative` is some multiple of 1/nm that is not known.
@@ -54,7 +55,7 @@ class SeenSpectrum:
 
 
 @dataclass(frozen=True, eq=False)
-class ReradiationMatrix:
+class ReradiationMatrix(NotebookViews):
     """Reflectance and re-radiation of a surface, constant in each band.
 
     Bands reach half-way to their neighbours. A number that was not measured is NaN; light of such

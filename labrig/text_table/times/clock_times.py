@@ -184,7 +184,7 @@ def _refuse_backward(clock: Clock, row: int, from_to: str) -> None:
     if clock.has_dates and not (is_within_an_hour and _is_night_of_change(clock, row + 1)):
         return
     raise UsageError(
-        f"{from_to}, and the spacing of the rows does not tell why: did summer time end, or was it "
+        f"{from_to}, and the spacing of the rows does not show why: did summer time end, or was it "
         "set? Write the times with their offset from UTC (2026-10-25 02:00:00+01:00), or as "
         "seconds"
     )

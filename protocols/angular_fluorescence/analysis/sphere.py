@@ -475,8 +475,8 @@ def _cut_warnings(view: View, outline: Outline) -> list[ResultWarning]:
     return [
         Disturbance(
             "outline-cut",
-            "expected the whole sphere in it, got its outline cut: {sides}; the outline rests on "
-            "what is left of it, and its error is in σ: enlarge the region",
+            "expected the whole sphere in it, got its outline cut: {sides}; the rest of the "
+            "outline is used, and its error is in σ: enlarge the region",
             subject="region",
             sides=tuple(
                 f"{side} by {px:.0f} px ({px / outline.radius:.0%} of its radius)"

@@ -80,7 +80,7 @@ def _temperature(patch: DecayPatch) -> str:
         return ""
     return (
         "the temperature was not recorded: 1 K in an hour, with traps 0.65 eV deep, would change "
-        f"{changes}; a thermometer in the rig would tell"
+        f"{changes}; a thermometer in the rig would show it"
     )
 
 

@@ -182,7 +182,7 @@ def ambient_light(darks: Sequence[SpectrometerReading]) -> Iterator[ResultWarnin
         yield Disturbance(
             "light-left",
             "with all lights off the spectrometer sees light ({counts_per_s:.0f} counts a second); "
-            "what stays the same is subtracted: darken the room, cover displays",
+            "its constant part is subtracted: darken the room, cover displays",
             counts_per_s=light / time_s,
         )
 

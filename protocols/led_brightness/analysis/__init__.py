@@ -122,7 +122,7 @@ def _without_unseen(
         Unmeasured(
             "channel-unseen",
             "the camera's channel {channels} sees no LED and is left out; check its curves, and "
-            "what lies before the lens",
+            "the filters before the lens",
             channels=tuple(found),
         )
     )

@@ -244,8 +244,8 @@ def _check_spectra(checked: Checked, bank: Bank, spectra: Mapping[str, Spectrome
         else:
             warning = Contradiction(
                 "peak-differs",
-                "LED '{leds}' shines about {centroid_nm:.0f} nm, {off_nm:+.0f} nm from what the "
-                "rig file says; its measured spectrum counts, correct the rig file",
+                "LED '{leds}' shines about {centroid_nm:.0f} nm, {off_nm:+.0f} nm from the value "
+                "in the rig file; its measured spectrum counts, correct the rig file",
                 leds=(name,),
                 centroid_nm=band.centroid_nm,
                 off_nm=off_nm,

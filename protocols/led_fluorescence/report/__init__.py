@@ -32,7 +32,7 @@ UV_SCALE = {
         "How bright the ultraviolet LEDs shone is not known (uv_scale: unknown): colours marked "
         "with * depend on it. The protocol led_brightness measures it with a spectrometer."
     ),
-    "none": "No LED is in the ultraviolet: what that excites is extrapolated.",
+    "none": "No LED is in the ultraviolet: fluorescence by ultraviolet light is extrapolated.",
 }
 #: Number of samples beyond which each is folded up.
 MAX_OPEN = 4
@@ -206,7 +206,7 @@ def _leds(result: LedFluorescenceResult) -> Section:
     table = Table(
         ("LED or lamp" if result.lamps else "LED", "peak / nm", "brightness / (DN/s)"),
         rows,
-        "Brightness: what a channel of sensitivity 1 would count of a perfect white.",
+        "Brightness: counts of a perfect white in a channel of sensitivity 1.",
     )
     text = [] if len(result.patches) > 1 else [UV_SCALE[result.uv_scale]]
     if result.geometry:
@@ -265,7 +265,7 @@ def _half_figures(
     values = Picture(
         f"{slug}-values",
         values_chart(patch, result),
-        "Values over the light of a white under the LED, and what the camera would see of the "
+        "Values over the light of a white under the LED, and the values predicted by the "
         "matrix (lines). Bars: 1 σ of the values.",
     )
     reflectance = Picture(
@@ -308,8 +308,8 @@ def _methods_note(patch: FluorescentPatch) -> str:
     if patch.direct is None:
         return note
     return (
-        f"{note} Points: as the spectrometer read it, ± 1 σ, without what it cannot tell from the "
-        "light itself."
+        f"{note} Points: as the spectrometer read it, ± 1 σ, without the part that it cannot "
+        "separate from the light itself."
     )
 
 
@@ -329,7 +329,7 @@ def _text(patch: FluorescentPatch) -> Iterator[str]:
     if patch.method == "per-led":
         yield (
             "Matrix, dyes and colours are those of one LED by itself (method: per-led), the "
-            "thesis's method. It has six numbers for three values, so that no σ can be told."
+            "thesis's method. It has six numbers for three values, so that there is no σ."
         )
     elif not patch.dyes:
         yield "The values are those of a surface that only reflects."
@@ -343,7 +343,7 @@ def _text(patch: FluorescentPatch) -> Iterator[str]:
         )
     if patch.bleaching is not None:
         ratio = plus_minus(patch.bleaching.value, patch.bleaching.sigma)
-        yield f"The first LED gave {ratio} at the end of the run of what it gave at its begin."
+        yield f"At the end of the run the first LED gave {ratio} of its light at the begin."
 
 
 def _dye_tables(patch: FluorescentPatch, matrix: ReradiationMatrix) -> tuple[Table, ...]:

@@ -119,7 +119,7 @@ class ColourScale:
         return Contradiction(
             "card-colour-differs",
             "the card under the lamp has another colour than the rig file's curves say (channels "
-            "{ratios:.2f} of what is expected): another lamp than its spectrum, a card that "
+            "{ratios:.2f} of the expected values): another lamp than its spectrum, a card that "
             "fluoresces, or another light; luminances may be wrong by as much",
             ratios=tuple(np.exp(logs - logs[np.argmax(card)]).tolist()),
         )

@@ -87,7 +87,7 @@ def test_the_result_is_read_back_and_its_page_says_what_it_is(run: Path) -> None
     assert len(rows) == 1 + 4 * 4
     page = done.report.read_text()
     assert page.count("<h2>Under ") == 4
-    assert "does not tell its brightness" in page
+    assert "does not measure its brightness" in page
 
 
 def _with_relays(relays: dict[str, int]) -> Callable[[dict[str, Any]], None]:

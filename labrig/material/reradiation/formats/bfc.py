@@ -46,7 +46,9 @@ def parse_bfc(text: str) -> ReradiationMatrix:
     comments = [line.text[1:].strip() for line in lines if line.text.startswith(";")]
     body = [line for line in lines if not line.text.startswith(";")]
     if len(body) < 2 or MARK not in body[1].text:
-        raise ValueError(f"expected 'BFC-450 {MARK}' in the second line")
+        raise ValueError(
+            f"expected 'BFC-450 {MARK}' in the second line; this is no file of a Labsphere BFC-450"
+        )
     if len(body) < 4:
         raise ValueError(f"line {body[-1].number}: the file ends before its first row")
     output_nm, input_nm = _grids(body[2])

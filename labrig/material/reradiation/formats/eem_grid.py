@@ -243,7 +243,10 @@ def _stacked(block: Block, excitation_nm: FloatArray | None) -> Grid:
     first = int(np.argmax(table[1:, 0] == table[0, 0])) + 1
     count = len(table) // first if first > 1 else 0
     if count < _FEWEST or len(table) != count * first:
-        raise ValueError("expected an excitation-emission matrix, got two columns")
+        raise ValueError(
+            "expected an excitation-emission matrix, got two columns; a decay goes to labrig fit "
+            "decay, a spectrum to labrig optics show"
+        )
     axis_nm = table[:first, 0]
     if not np.array_equal(table[:, 0].reshape(count, first), np.tile(axis_nm, (count, 1))):
         raise ValueError("expected the same emission wavelengths in all spectra, got others")
@@ -342,7 +345,8 @@ def emission_in_rows(grid: Grid, rows: Axis | None) -> tuple[bool, str]:
         return grid.rows == "emission", ""
     if told is None:
         raise ValueError(
-            "expected names of the axes or light on one side of the diagonal, which tells them, "
+            "expected names of the axes or light on one side of the diagonal, which identifies "
+            "them, "
             f"got neither; {_OPTION}"
         )
     return told == "emission", f"rows are {told}: their side of the diagonal has the light"

@@ -181,7 +181,7 @@ def _parsed(path: Path, content: bytes, layout: MatrixLayout | None) -> Reradiat
 
 def _refuse_layout(layout: MatrixLayout | None) -> None:
     if layout is not None:
-        raise ValueError("expected an excitation-emission matrix where its axes are told")
+        raise ValueError("expected an excitation-emission matrix if axes are stated")
 
 
 def _picked(path: Path, names: list[str], entry: str | None) -> str:

@@ -218,8 +218,8 @@ def test_an_exposure_begins_where_the_answer_lets_it_begin(
     [
         ({"formats": frozenset({0x3801, 0x380D})}, "no RAW format (it lists 0x3801, 0x380D)"),
         ({"reports": frozenset({COMPLETE})}, "does not report its frames"),
-        ({"properties": {0x500D: (6, 10_000)}}, "does not tell its ISO"),
-        ({"properties": {0x500F: (4, 400)}}, "does not tell its shutter time"),
+        ({"properties": {0x500D: (6, 10_000)}}, "does not report its ISO"),
+        ({"properties": {0x500F: (4, 400)}}, "does not report its shutter time"),
         ({"properties": {0x500D: (6, 10_000), 0x500F: (4, 0xFFFF)}}, "automatic ISO"),
         ({"properties": {0x500E: (4, 2)}}, "chooses exposures (exposure program (0x500E) = 0x2)"),
         ({"properties": {0x500A: (4, 2)}}, "autofocus is on"),

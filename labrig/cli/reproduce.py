@@ -1,4 +1,4 @@
-"""`labrig compare`: comparison of a run with predictions, another material and the paper."""
+"""`labrig reproduce`: a run beside predictions, another material and the paper."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labrig.cli.completion import complete_run
+from labrig.cli.screen import echo, echo_table
 from labrig.foundation.result_warning import ResultWarning, warning_lines
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 TABLE = "rendered.csv"
 
 
-def compare(
+def reproduce(
     run: Annotated[
         Path,
         typer.Argument(
@@ -67,14 +68,14 @@ def compare(
             help="With --rendered: factor from Λ to s/sr of a material whose file has no scale.",
         ),
     ] = None,
-    figures: Annotated[
+    out: Annotated[
         Path | None,
         typer.Option(help="Folder for the figures; default: comparison in the run folder."),
     ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, draw nothing.")] = False,
 ) -> None:
-    """Predicted against photographed glow, more states against one, a material beside another.
+    """Predicted beside photographed glow of a run, more states beside one, another material.
 
     With the paper's own numbers (Nalbach et al., fig. 8 and 9, section 4.4, Table 1). With
     --rendered also fluorescent samples under lamps, photographed by validate_illuminants.
@@ -104,7 +105,7 @@ def compare(
         return
     for line in warning_lines(warnings, "warning: "):
         typer.echo(line, err=True)
-    drawn = figures or folder / "comparison"
+    drawn = out or folder / "comparison"
     for section in (*pages, *(() if room is None else room.sections)):
         _print_section(section)
         _save_figures(section, drawn)
@@ -114,7 +115,7 @@ def compare(
     typer.echo(f"table: {drawn / TABLE}")
     if room.scene is not None:
         typer.echo(f"scene: {room.scene.write(drawn)}")
-    if figures is None:
+    if out is None:
         options = _options(material, white, camera, assume_albedo, assume_scale)
         _show_in_report(folder, room.sections, options)
 
@@ -204,7 +205,7 @@ def _show_in_report(folder: Path, pages: "tuple[Section, ...]", options: list[st
 
     if not pages:
         return
-    command = shlex.join(["labrig", "compare", folder.name, "--rendered", *options])
+    command = shlex.join(["labrig", "reproduce", folder.name, "--rendered", *options])
     made = replace(pages[0], text=(*pages[0].text, f"Made by: {command}"))
     report = folder / "result" / "report.html"
     if show_comparison(folder, (made, *pages[1:])):
@@ -223,23 +224,14 @@ def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
 
 
 def _print_section(section: "Section") -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(highlight=False)
-    console.print(f"\n[bold]{section.title}[/bold]")
+    echo(f"\n{section.title}", bold=True)
     for text in section.text:
-        console.print(text, style="dim")
-    for data in section.tables:
-        if data.title:
-            console.print(f"\n[bold]{data.title}[/bold]")
-        table = Table(box=None, pad_edge=False)
-        for number, heading in enumerate(data.head):
-            table.add_column(heading, justify="right" if number else "left", overflow="fold")
-        for row in data.rows:
-            table.add_row(*row)
-        console.print(table)
-        console.print(data.caption, style="dim")
+        echo(text, dim=True)
+    for table in section.tables:
+        if table.title:
+            echo(f"\n{table.title}", bold=True)
+        echo_table(table.head, table.rows)
+        echo(table.caption, dim=True)
 
 
 def _save_figures(section: "Section", folder: Path) -> None:

@@ -1,0 +1,4 @@
+from .views import (
+    html as html,
+    plot as plot,
+)
