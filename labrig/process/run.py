@@ -397,7 +397,8 @@ def rendered_result(result: RunResult) -> Rendered:
     ['Results', 'Sample']
     """
     folder = _folder_of(result)
-    run, protocol = read_run(folder), read_run_protocol(folder)
+    run = read_run(folder)
+    protocol: Any = read_run_protocol(folder)
     rig = with_shipped_camera(Overrides().bench(folder), run.camera_identity)
     camera, _ = _camera_response(rig, None, Inputs.of(rig).updated_by(result)[LVF_KIND])
     source = Source(run, protocol, rig, describe_run(run, protocol, rig), camera)
