@@ -25,6 +25,7 @@ from labrig.cli import (
 )
 from labrig.cli.completion import complete_run
 from labrig.cli.process import ProcessCommand
+from labrig.cli.screen import echo
 
 
 class ByPurpose(TyperGroup):
@@ -75,7 +76,7 @@ def frame(
     if json:
         typer.echo(json_format.dumps(measured.to_json()))
     else:
-        typer.echo(str(measured))
+        echo(str(measured))
 
 
 def figures(
@@ -99,7 +100,7 @@ def figures(
     from labrig.process import draw_figures
 
     path, n_pages = draw_figures(find_run(run, runs), out)
-    typer.echo(f"{path}: {n_pages} figures")
+    echo(f"{path}: {n_pages} figures")
 
 
 def schema(
@@ -119,7 +120,7 @@ def explain(
     """Explain a key of a file, the code of a warning, or a term of the glossary."""
     from labrig.explain import explain as explain_name
 
-    typer.echo("\n\n".join(map(str, explain_name(name))))
+    echo("\n\n".join(map(str, explain_name(name))))
 
 
 @optics_app.command("show")
@@ -137,10 +138,10 @@ def show_curves(
     from labrig.report import describe_curves, draw_curves
 
     curves = read_checked_curves(file, curve)
-    typer.echo(describe_curves(curves))
+    echo(describe_curves(curves))
     if picture is not None:
         draw_curves(curves, picture)
-        typer.echo(f"drawn into {picture}")
+        echo(f"drawn into {picture}")
 
 
 @optics_app.command("list")
@@ -148,7 +149,7 @@ def list_curves() -> None:
     """Cameras, colour filters and other curves that are shipped."""
     from labrig.report import describe_shipped_curves
 
-    typer.echo(describe_shipped_curves())
+    echo(describe_shipped_curves())
 
 
 @sim_app.command("camera")
@@ -222,7 +223,7 @@ def main(
     if version:
         from importlib.metadata import version as installed
 
-        typer.echo(f"labrig {installed('labrig')}")
+        echo(f"labrig {installed('labrig')}")
         raise typer.Exit
 
 

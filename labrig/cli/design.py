@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.page import NoBrowserOption, PortOption, announcing
+from labrig.cli.screen import echo
 from labrig.foundation.activity import activity
 from labrig.foundation.clock import SystemClock
 
@@ -124,27 +125,27 @@ def _solve(constraints: Path, out: Path | None, picture: Path | None, nearest: b
         if nearest:
             raise UsageError("expected --nearest with a light programme, got a scene")
         in_scene = solve_in_scene(wish)
-        typer.echo(describe_scene_design(in_scene))
+        echo(describe_scene_design(in_scene))
         if out is not None:
             if weaker := describe_factor(written_factor(in_scene.design, in_scene.spectra)):
-                typer.echo(f"! {weaker}")
+                echo(f"! {weaker}")
             _write(in_scene.material, out)
         if picture is not None:
             draw_scene_design(in_scene, picture)
-            typer.echo(f"drawn into {picture}")
+            echo(f"drawn into {picture}")
         return
     wished, found = wish.solve_kept()
     measured = [each for each in nearest_materials(found) if each] if nearest else []
-    typer.echo(describe_design(found, wish.places, measured))
+    echo(describe_design(found, wish.places, measured))
     if found is not wished and (cost := describe_energy(wished, found)):
-        typer.echo(cost)
+        echo(cost)
     if out is not None:
         if weaker := describe_factor(written_factor(found)):
-            typer.echo(f"! {weaker}")
+            echo(f"! {weaker}")
         _write(to_material(found, wish.file.name), out)
     if picture is not None:
         draw_design(found, wish.places, picture)
-        typer.echo(f"drawn into {picture}")
+        echo(f"drawn into {picture}")
 
 
 def _spread(
@@ -155,21 +156,21 @@ def _spread(
     from labrig.reproduce import write_parameter_texture
 
     found = solve_spread(wish, folder)
-    typer.echo(describe_spread(found))
+    echo(describe_spread(found))
     if nearest:
-        typer.echo(NOT_IN_SCENES, err=True)
+        echo(NOT_IN_SCENES, err=True)
     if out is not None:
         texture = out.with_name(f"{out.stem}-texture.npz")
         _write(found.material, out)
         write_parameter_texture(texture, found.texture)
-        typer.echo(f"written: {texture}")
-        typer.echo(
+        echo(f"written: {texture}")
+        echo(
             f"In the scene, beside both files:\nmaterials:\n  {found.light.material}: "
             f"{{file: {out.name}, texture: {texture.name}}}"
         )
     if picture is not None:
         draw_scene_design(found, picture)
-        typer.echo(f"drawn into {picture}")
+        echo(f"drawn into {picture}")
 
 
 def _write(material: "Material", path: Path) -> None:
@@ -180,4 +181,4 @@ def _write(material: "Material", path: Path) -> None:
         write_material(path, material)
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
-    typer.echo(f"written: {path}")
+    echo(f"written: {path}")

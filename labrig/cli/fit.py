@@ -20,6 +20,7 @@ from labrig.cli.material import (
     checked,
     read_matrix,
 )
+from labrig.cli.screen import echo
 from labrig.foundation.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -160,27 +161,27 @@ def decay(
     (table,) = tables
     fitted = fit_table(table, options, layout)
     if not json:
-        typer.echo(f"columns  {fitted[0].columns}")
+        echo(f"columns  {fitted[0].columns}")
     for part in fitted:
         fit = part.fit
         if json:
             typer.echo(fit.to_json())
             continue
-        typer.echo(f"{part.region}\n{fit}".strip())
+        echo(f"{part.region}\n{fit}".strip())
         if times_s:
             # Without a known lamp off, times count from the first row, as the amplitudes do.
             after_s = 0.0 if origin is None else part.series.clock.after_zero_s(origin)
             if origin is None and not fit.reference.is_lamp_off:
-                typer.echo(f"times count from {fit.reference}")
-            typer.echo(str(fit.forecast(times_s, after_s=after_s)))
+                echo(f"times count from {fit.reference}")
+            echo(str(fit.forecast(times_s, after_s=after_s)))
     if out is not None:
         from labrig.process import report_table
 
         processed = report_table(table, fitted, options, out, layout)
         if not json:
             for line in processed.changes:
-                typer.echo(line)
-            typer.echo(f"report: {processed.report}")
+                echo(line)
+            echo(f"report: {processed.report}")
 
 
 def _fit_shared(
@@ -198,8 +199,8 @@ def _fit_shared(
         typer.echo(shared.to_json())
     else:
         for table, part in zip(shared.tables, fitted, strict=True):
-            typer.echo(f"{table.name}  {part.columns}")
-        typer.echo(str(shared))
+            echo(f"{table.name}  {part.columns}")
+        echo(str(shared))
     if out is None:
         return
     from labrig.process import report_shared_decay
@@ -224,7 +225,7 @@ def _fit_shared(
     series = [part.series for part in fitted]
     report = report_shared_decay(tables, shared, series, shlex.join(command), out)
     if not json:
-        typer.echo(f"report: {report}")
+        echo(f"report: {report}")
 
 
 @app.command("charge")
@@ -289,7 +290,10 @@ def charge(
     options = ChargeTableOptions(on, off, states, order, stimulated, intervals)
     layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     fit, columns = fit_charge_table(table, options, layout)
-    typer.echo(fit.to_json() if json else f"columns  {columns}\n{fit}")
+    if json:
+        typer.echo(fit.to_json())
+    else:
+        echo(f"columns  {columns}\n{fit}")
     if out is None:
         return
     from labrig.process import report_charge
@@ -298,14 +302,14 @@ def charge(
     if json:
         return
     for line in reported.changes:
-        typer.echo(line)
-    typer.echo(
+        echo(line)
+    echo(
         f"material: {reported.material}"
         if reported.material
         else "no material file: this charge does not separate k_r and r(0) of its states; "
         "fit.json has amplitude, τ and p after this charge"
     )
-    typer.echo(f"report: {reported.report}")
+    echo(f"report: {reported.report}")
 
 
 @app.command("luminance")
@@ -358,7 +362,10 @@ def luminance(
     )
     layout = TableLayout(time, column, time_unit, decimal, time_per_channel, block)
     decay, columns = evaluate_luminance_table(table, options, layout)
-    typer.echo(decay.to_json() if json else f"columns  {columns}\n{decay}")
+    if json:
+        typer.echo(decay.to_json())
+    else:
+        echo(f"columns  {columns}\n{decay}")
 
 
 @app.command("mixture")
@@ -435,7 +442,10 @@ def mixture(
     except (UsageError, DataError) as error:
         raise type(error)(f"{file}: {error}") from None
     fitted = FittedMatrix(matrix, fit, lights)
-    typer.echo(fitted.to_json() if as_json else describe_mixture(fitted))
+    if as_json:
+        typer.echo(fitted.to_json())
+    else:
+        echo(describe_mixture(fitted))
     if out is None:
         return
     from labrig.process import report_mixture
@@ -460,7 +470,7 @@ def mixture(
         command += ["--light", name]
     report = report_mixture(Path(file), fitted, shlex.join(command), out)
     if not as_json:
-        typer.echo(f"report: {report}")
+        echo(f"report: {report}")
 
 
 def _require_one_of(option: str, value: str, choices: tuple[str, ...]) -> None:

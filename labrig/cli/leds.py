@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.material import Corrected, checked, read_fractions
+from labrig.cli.screen import echo
 from labrig.foundation.errors import DataError, UsageError
 
 if TYPE_CHECKING:
@@ -124,7 +125,10 @@ def study(
                 sets.append(found)
     sets.sort(key=lambda one: len(one.peaks_nm))
     compared = ComparedLeds(tuple(sets), response.name, of_surfaces)
-    typer.echo(compared.to_json() if as_json else describe_leds(compared))
+    if as_json:
+        typer.echo(compared.to_json())
+    else:
+        echo(describe_leds(compared))
     if out is None:
         return
     from labrig.process import report_led_study
@@ -137,7 +141,7 @@ def study(
     command += [flag for flag, is_set in flags.items() if is_set]
     report = report_led_study(compared, shlex.join(command), out)
     if not as_json:
-        typer.echo(f"report: {report}")
+        echo(f"report: {report}")
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:
@@ -161,7 +165,7 @@ def _surfaces(
     kind = "measured matrices"
     if not matrices:
         matrices, kind = sorted(resources.names("config/fluorescent")), "shipped materials"
-        typer.echo(
+        echo(
             f"note: no matrices are named, so the {len(matrices)} shipped materials are taken, "
             "which are made up; give measured ones to choose LEDs by",
             err=True,
@@ -171,7 +175,7 @@ def _surfaces(
         raise UsageError(f"{', '.join(matrices)}: expected re-radiation matrices, got no such file")
     if len(files) > MOST and not is_all:
         chosen = [files[index * len(files) // MOST] for index in range(MOST)]
-        typer.echo(f"note: {MOST} of {len(files)} matrices are used; --all uses all", err=True)
+        echo(f"note: {MOST} of {len(files)} matrices are used; --all uses all", err=True)
         files, kind = chosen, f"{kind} of {len(files)}"
     surfaces = [checked(file, read_fractions(file), is_corrected) for file in files]
     for file, surface in zip(files, surfaces, strict=True):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.screen import echo
 from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def checked(file: str, matrix: "ReradiationMatrix", is_corrected: bool) -> "Rera
     except DataError as error:
         raise DataError(f"{file}: {error}") from None
     for line in warning_lines(warnings, "warning: "):
-        typer.echo(line, err=True)
+        echo(line, err=True)
     return matrix
 
 
@@ -211,17 +212,17 @@ def show(
 
     material = read_any(file, entry, pixel, rows, excitation)
     if isinstance(material, Material):
-        typer.echo(describe_phosphor(material))
+        echo(describe_phosphor(material))
         if picture is not None:
             draw_phosphor(material, picture)
-            typer.echo(f"drawn into {picture}")
+            echo(f"drawn into {picture}")
         return
     material = checked(file, material, corrected)
     lights = [read_light(name) for name in light or LIGHTS]
-    typer.echo(describe_reradiation(material, lights))
+    echo(describe_reradiation(material, lights))
     if picture is not None:
         draw_reradiation(material, lights, picture)
-        typer.echo(f"drawn into {picture}")
+        echo(f"drawn into {picture}")
 
 
 @app.command("convert")
@@ -251,7 +252,7 @@ def convert(
         write_fluorescent(out, matrix)
     else:
         write_reradiation(out, matrix)
-    typer.echo(f"written: {out}")
+    echo(f"written: {out}")
 
 
 @app.command("from-cubes")
@@ -295,8 +296,8 @@ def from_cubes(
     else:
         write_reradiation(out, matrix)
     lights = ", ".join(f"{nm:.0f}" for nm in columns.input_nm)
-    typer.echo(f"{name}: {len(columns.lights)} lights at {lights} nm")
-    typer.echo(f"written: {out}")
+    echo(f"{name}: {len(columns.lights)} lights at {lights} nm")
+    echo(f"written: {out}")
 
 
 @app.command("apply")
@@ -364,7 +365,7 @@ def compare(
         typer.echo(json.dumps(rows, indent=1))
         return
     for line in difference_lines(differences):
-        typer.echo(line)
+        echo(line)
 
 
 @app.command("list")
@@ -388,15 +389,15 @@ def list_materials(
         try:
             matrix = checked(path.name, read_matrix(str(path)), is_corrected=False)
         except (UsageError, DataError) as error:
-            typer.echo(f"left out: {error}", err=True)
+            echo(f"left out: {error}", err=True)
             continue
         matrices.append(matrix)
-        typer.echo(f"{path.name:20} {matrix.name:32} {reradiation_text(matrix)}")
+        echo(f"{path.name:20} {matrix.name:32} {reradiation_text(matrix)}")
     if not matrices:
         raise UsageError(f"{folder}: expected files of re-radiation matrices, got none of use")
     if picture is not None:
         draw_contact_sheet(matrices, read_light("D65"), picture)
-        typer.echo(f"drawn into {picture}")
+        echo(f"drawn into {picture}")
 
 
 def _write_lines(lines: list[str], out: Path | None) -> None:
@@ -404,7 +405,7 @@ def _write_lines(lines: list[str], out: Path | None) -> None:
 
     if out is None:
         for line in lines:
-            typer.echo(line)
+            echo(line)
         return
     write_text(out, "\n".join(lines) + "\n")
-    typer.echo(f"written: {out}")
+    echo(f"written: {out}")

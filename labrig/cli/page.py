@@ -9,6 +9,7 @@ import typer
 
 from labrig.cli.completion import complete_run
 from labrig.cli.default_rig import RigArgument, rig_path
+from labrig.cli.screen import echo
 from labrig.foundation.activity import activity
 from labrig.foundation.clock import SystemClock
 
@@ -31,7 +32,7 @@ def announcing(no_browser: bool) -> Iterator[Callable[[str], None]]:
 
         def announce(url: str) -> None:
             making_ready.close()
-            typer.echo(url)
+            echo(url)
             if not no_browser:
                 import webbrowser
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_scene
+from labrig.cli.screen import echo
 from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
@@ -121,11 +122,11 @@ def render(
     adapted = None if built.white is None else white_under(built.white, built.bands.edges_nm)
     require_traceable(built)
     for line in warning_lines(built.notes, "note: "):
-        typer.echo(line, err=True)
+        echo(line, err=True)
     folder = RenderFolder.open(out or Path("renders") / built.file.name, built)
     done, count = folder.n_done, len(folder.times_s)
     if done:
-        typer.echo(f"{done} of {count} pictures are there already", err=True)
+        echo(f"{done} of {count} pictures are there already", err=True)
     clock = SystemClock()
     begin_s = clock.now()
     with activity("rendering") as work:
@@ -139,14 +140,14 @@ def render(
         for number, frame in enumerate(frames, done + 1):
             left_s = round((clock.now() - begin_s) / (number - done) * (count - number))
             remaining = f", about {duration_text(left_s)} left" if number < count else ""
-            typer.echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
+            echo(f"picture {number} of {count}, at {frame.t_s:g} s{remaining}", err=True)
             for line in warning_lines(frame.warnings, "warning: "):
-                typer.echo(line, err=True)
+                echo(line, err=True)
     _draw(folder, built, night, adapted, video, fps)
     if linear:
         _write_linear(folder)
     _export(folder, built, gltf, mitsuba)
-    typer.echo(folder.path)
+    echo(folder.path)
 
 
 def _export(
@@ -164,7 +165,7 @@ def _export(
     meshes = exported_meshes(scene, folder)
     for mesh in meshes:
         if mesh.preview is not None:
-            typer.echo(f"{mesh.name}: {mesh.preview.statement}", err=True)
+            echo(f"{mesh.name}: {mesh.preview.statement}", err=True)
     if gltf is not None:
         times_s = [t_s - folder.times_s[0] for t_s in folder.times_s]
         brightest = max(
@@ -173,10 +174,10 @@ def _export(
         )
         exposure = 1 / brightest if brightest else 1.0
         write_gltf(gltf, meshes, times_s, exposure, scene.camera, up="z")
-        typer.echo(f"wrote {gltf}: sRGB of what glows, without light between surfaces", err=True)
+        echo(f"wrote {gltf}: sRGB of what glows, without light between surfaces", err=True)
     if mitsuba is not None:
         written = write_mitsuba_scene(mitsuba, meshes, scene.camera)
-        typer.echo(f"wrote {written}: lamps and glow in sRGB, not re-radiation", err=True)
+        echo(f"wrote {written}: lamps and glow in sRGB, not re-radiation", err=True)
 
 
 def _write_linear(folder: "RenderFolder") -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labrig.cli.completion import complete_run
+from labrig.cli.screen import echo
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.user_folder import settings_file
 
@@ -55,9 +56,9 @@ def verify(
         typer.echo(json_text.dumps(_content(folder, verification), ensure_ascii=False, indent=2))
     else:
         for line in (*verification.intact, verification.seal_line):
-            typer.echo(line)
+            echo(line)
     for line in verification.doubtful:
-        typer.echo(f"warning: {line}", err=True)
+        echo(f"warning: {line}", err=True)
     if not verification.is_intact:
         named, more = verification.changed[:_MAX_NAMED], verification.changed[_MAX_NAMED:]
         others = f"; {len(more)} more, all of them with --json" if more else ""
@@ -96,7 +97,7 @@ def seal(
     lab_key = read_key(path)
     for folder in [find_run(each, runs) for each in run]:
         made = seal_run(folder, lab_key, SystemClock().wall())
-        typer.echo(
+        echo(
             f"{folder}: sealed {made.files.sealed}, {len(made.files.sha256)} files, by "
             f"{lab_key.name} ({made.signer.fingerprint})"
         )
@@ -172,7 +173,7 @@ def trust(
     make_folder(trusted.parent)
     write_text(trusted, (before | new_signers).text())
     for key, name in new_signers.names.items():
-        typer.echo(f"{name} ({key.fingerprint})")
+        echo(f"{name} ({key.fingerprint})")
 
 
 def key_file() -> Path:
@@ -197,4 +198,4 @@ def _trusted_file() -> Path:
 
 def _print(key: "LabKey", path: Path) -> None:
     typer.echo(key.public_line)
-    typer.echo(f"{key.name} ({key.public.fingerprint}); private key: {path}", err=True)
+    echo(f"{key.name} ({key.public.fingerprint}); private key: {path}", err=True)

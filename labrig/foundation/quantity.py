@@ -56,9 +56,8 @@ def parse(text: str, units: dict[str, float]) -> float:
     if match is None or match["unit"] not in units:
         example = next(unit for unit, factor in units.items() if factor == max(units.values()))
         with_point = text.replace(",", ".", 1)
-        remedy = (
-            f"; write a decimal point: '{with_point}'" if _PATTERN.fullmatch(with_point) else ""
-        )
+        is_comma = with_point != text and _PATTERN.fullmatch(with_point) is not None
+        remedy = f"; write a decimal point: '{with_point}'" if is_comma else ""
         raise ValueError(
             f"expected a number with a unit ({', '.join(units)}), such as '5 {example}', "
             f"got '{text}'{remedy}"

@@ -1,5 +1,6 @@
 """A design, also in a scene: in words, and in pictures of what was wanted and what is possible."""
 
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,7 +9,7 @@ import numpy as np
 
 from labrig.design import RGB_TO_Y, Design, NearestMaterial, SceneDesign, SpreadDesign
 from labrig.foundation.arrays import FloatArray
-from labrig.foundation.number_format import rounded
+from labrig.foundation.number_format import aligned, power_of_ten, rounded
 from labrig.foundation.quantity import duration_text
 from labrig.optics import srgb_bytes
 from labrig.report.colours import css_colour, into_gamut
@@ -235,20 +236,25 @@ def _keys(design: Design, places: Sequence[str]) -> Iterator[str]:
     """Yield a line for each key, in units in which a white card under a light of 1 is 1, 1, 1."""
     keys = design.keys
     wanted, got = np.pi * keys.rgb(design.bands), np.pi * design.got_rgb
-    name = f" {'place':12}" if len(places) > 1 else ""
-    yield f"{'key':4}{'at':>10}{name}  {'wanted R, G, B':27} {'got':27} ΔE2000"
-    for key, (first, second) in enumerate(zip(wanted, got, strict=True)):
-        if key == MAX_LINES:
-            worst = int(design.delta_e2000.argmax())
-            yield (
-                f"{keys.count - key} more; the largest difference of all is "
-                f"{design.delta_e2000[worst]:.1f} of key {worst + 1}"
-            )
-            return
-        where = f" {places[keys.place[key]]:12}" if len(places) > 1 else ""
+    has_places = len(places) > 1
+    # One power of ten for all: a line fits a terminal, and its numbers compare at a glance.
+    most = float(max(wanted.max(initial=0.0), got.max(initial=0.0)))
+    exponent = math.floor(math.log10(most)) if most > 0 else 0
+    unit = f" / {power_of_ten(exponent)}" if exponent else ""
+    wanted, got = wanted / 10.0**exponent, got / 10.0**exponent
+    place = ["place"] if has_places else []
+    rows = [["key", "at", *place, f"wanted R, G, B{unit}", f"got{unit}", "ΔE2000"]]
+    for key in range(min(keys.count, MAX_LINES)):
+        where = [places[keys.place[key]]] if has_places else []
+        colours = (_numbers(wanted[key]), _numbers(got[key]))
+        at = time_text(float(keys.time_s[key]))
+        rows.append([f"{key + 1}", at, *where, *colours, f"{design.delta_e2000[key]:.1f}"])
+    yield from aligned(rows)
+    if keys.count > MAX_LINES:
+        worst = int(design.delta_e2000.argmax())
         yield (
-            f"{key + 1:<4}{time_text(float(keys.time_s[key])):>10}{where}  "
-            f"{_numbers(first):27} {_numbers(second):27} {design.delta_e2000[key]:6.1f}"
+            f"{keys.count - MAX_LINES} more; the largest difference of all is "
+            f"{design.delta_e2000[worst]:.1f} of key {worst + 1}"
         )
 
 
@@ -328,7 +334,7 @@ def _shown(rgb: FloatArray, wanted: FloatArray) -> str:
 
 
 def _numbers(values: FloatArray) -> str:
-    return ", ".join(f"{value:.3g}" for value in values.tolist())
+    return ", ".join(rounded(value, 3) for value in values.tolist())
 
 
 #: Frames that are drawn, spread over the keys.

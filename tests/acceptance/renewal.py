@@ -25,9 +25,8 @@ def changes(campaign: Campaign, published: Output, measured: Output) -> list[str
     texts += [(quote.page, quote.text) for quote in QUOTES if quote.campaign == campaign.name]
     changed = []
     for where, extract in texts:
-        before = extract(published.printed)
         try:
-            now = extract(measured.printed)
+            before, now = extract(published.printed), extract(measured.printed)
         except ValueError as error:
             changed.append(f"{where}: {error}")
             continue

@@ -49,7 +49,8 @@ def test_pages_for_users_name_no_test_commands() -> None:
         for pattern in USER_PAGES
         for path in ROOT.glob(pattern)
         for match in re.finditer(
-            r"tests\.acceptance|\btests/\w+/\w+\.py|pytest [-\w]|\b\d+ seeds", path.read_text("utf-8")
+            r"tests\.acceptance|\btests/\w+/\w+\.py|pytest [-\w]|\b\d+ seeds",
+            path.read_text("utf-8"),
         )
     ]
     assert named == []

@@ -120,7 +120,7 @@ def test_a_region_is_four_numbers(region: object, received: str) -> None:
         ({"repeats": "many"}, "repeats: expected a whole number, got 'many'"),
         ({"repeats": 0}, "repeats: expected a number of at least 1, got '0'"),
         ({"states": 4}, "states: expected 'auto', 1, 2 or 3, got '4'"),
-        ({"camera": [1]}, "camera: expected 'key: value' lines, got a list"),
+        ({"camera": [1]}, "camera: expected 'key: value' lines with iso, f_number, got a list"),
         ({"daylight": "perhaps"}, "daylight: expected true or false, got 'perhaps'"),
     ],
 )

@@ -57,7 +57,7 @@ def test_what_nobody_says_is_named(
 ) -> None:
     path = real_data / "wrighttools" / name
     assert read_spectrum(path).at([nm]) == value
-    assert "is not stated" in caplog.text
+    assert "does not state the quantity" in caplog.text
     with pytest.raises(UsageError, match="whose meaning is not stated; write above the columns"):
         read_transmittance(path)
 
@@ -120,8 +120,8 @@ def test_marks_of_no_measurement_are_left_out_and_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("Raman shift (cm-1),Counts\n400,1\n500,2\n", "expected an axis of wavelengths"),
-        ("Time (s),Counts\n400,1\n500,2\n", "expected an axis of wavelengths"),
+        ("Raman shift (cm-1),Counts\n400,1\n500,2\n", "expected a column of wavelengths"),
+        ("Time (s),Counts\n400,1\n500,2\n", "expected a column of wavelengths"),
         ("Frequency,Counts\n400,1\n500,2\n", "expected the unit of 'Frequency'"),
         ("Wavelength (furlong),Counts\n400,1\n500,2\n", "expected an axis in nm"),
         ("Wavelength (µm),Counts\n400,1\n500,2\n", "expected wavelengths from 100 to 20000 nm"),
