@@ -170,7 +170,7 @@ def test_a_fault_that_stays_ends_the_run_which_goes_on_when_it_is_mended(
     out_of_reach = "switch off by hand" in line and fault != {"relays_echo_lost": {"at": "30 s"}}
     assert lamp_is_on(stands[-1]) == (out_of_reach and "lamp:" in line)
     without_faults(before.folder)
-    again = labrig("resume", before.folder, "--no-process")
+    again = labrig("resume", before.folder, "--no-process", "--edited")
     assert again.code == 0, again.err
     after = recorded(runs)
     assert list(after.completed()) == ["dark", "decay-1"]
@@ -253,7 +253,7 @@ def test_lack_of_memory_with_the_lamp_on_ends_the_run_with_one_line(
     assert "too little memory" in complaint(ended)
     assert not lamp_is_on(stands[-1])
     assert [attempt.exit_status for attempt in recorded(runs).attempts] == ["success", "fail"]
-    assert labrig("resume", recorded(runs).folder, "--no-process").code == 0
+    assert labrig("resume", recorded(runs).folder, "--no-process", "--edited").code == 0
 
 
 def test_a_driver_that_lacks_memory_is_not_blamed() -> None:
@@ -311,7 +311,7 @@ def test_a_lamp_that_another_program_switches_off_ends_the_run(
     assert "was switched on 1 min ago and reads off" in complaint(ended)
     record = recorded(runs)
     assert list(record.completed()) == ["dark"]
-    assert labrig("resume", record.folder, "--no-process").code == 0
+    assert labrig("resume", record.folder, "--no-process", "--edited").code == 0
     assert list(recorded(runs).completed()) == ["dark", "decay-1"]
 
 
@@ -365,7 +365,7 @@ def test_a_welded_relay_is_seen_by_the_camera(
     assert lamp_is_on(stands[-1])
     (run,) = runs.iterdir()
     without_faults(run)
-    assert labrig("resume", run, "--no-process").code == 0
+    assert labrig("resume", run, "--no-process", "--edited").code == 0
     assert not lamp_is_on(stands[-1])
 
 
@@ -417,7 +417,7 @@ def test_times_of_faults_are_the_walls_so_that_what_is_over_stays_over(
     assert labrig("run", protocol, "--rig", bench, "--runs", runs, "--no-process").code == 3
     (run,) = runs.iterdir()
     assert "DeviceBusy" in read_run(run).attempts[-1].reason
-    assert labrig("resume", run, "--no-process").code == 0
+    assert labrig("resume", run, "--no-process", "--edited").code == 0
 
 
 @pytest.mark.parametrize(
@@ -430,7 +430,7 @@ def test_a_clock_that_was_stepped_between_run_and_resume_harms_nothing(
     bench = rig({"camera_busy": {"at": "43 s", "for": "10 s"}}, {step: {"at": "20 s", "by": "1 h"}})
     assert labrig("run", protocol, "--rig", bench, "--runs", runs, "--no-process").code == 3
     before = recorded(runs)
-    ended = labrig("resume", before.folder, "--no-process")
+    ended = labrig("resume", before.folder, "--no-process", "--edited")
     assert ended.code == 0, ended.err
     assert ("was set back" in ended.err) is warned
     attempt = recorded(runs).completed()["decay-1"]

@@ -37,6 +37,13 @@ from labrig.acquire.rig_file import (
 )
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
 from labrig.acquire.roles.role import Finding, Severity
+from labrig.acquire.run_plan import (
+    EDITED,
+    read_result_rig,
+    read_run_protocol,
+    read_run_rig,
+    result_takes_edits,
+)
 from labrig.acquire.runner import RunObserver, run_units
 from labrig.acquire.running_programs import Program, linux_programs, running_programs
 from labrig.acquire.session import TOLERANCE_S, Session
@@ -51,6 +58,7 @@ from labrig.acquire.values import (
 )
 
 __all__ = [
+    "EDITED",
     "MAX_STEPS",
     "PORT_FAILURES",
     "SERVICES",
@@ -110,8 +118,12 @@ __all__ = [
     "plan",
     "planned_rig",
     "read_protocol",
+    "read_result_rig",
     "read_rig_file",
+    "read_run_protocol",
+    "read_run_rig",
     "require_own_ports",
+    "result_takes_edits",
     "run_units",
     "running_programs",
     "shutter_text",

@@ -153,6 +153,11 @@ class ProtocolModel(FrozenModel):
         return (FrameRole.DECAY,)
 
     @property
+    def picture_frames(self) -> Collection[str]:
+        """Roles of the frames that show the sample, the best first, for its small picture."""
+        return (*self.rate_frames, FrameRole.DAYLIGHT)
+
+    @property
     def sample_in_place(self) -> str | None:
         """Name of the sample that is in place during the run; None if units bring their own."""
         return self.sample.name

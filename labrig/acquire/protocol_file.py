@@ -52,7 +52,13 @@ def read_protocol(
     """
     path = Path(path)
     require_kind(path, PROTOCOL)
-    content = read_yaml(path)
+    return protocol_of(read_yaml(path), path, changes)
+
+
+def protocol_of(
+    content: dict[str, Any], path: Path, changes: Mapping[str, Any] = MappingProxyType({})
+) -> ProtocolModel:
+    """Return the protocol with the content of the file at `path`, as `read_protocol` does."""
     model = _model(content, str(path))
     content = with_absolute_paths(content, model, path.resolve().parent)
     for key, value in changes_with_absolute_paths(changes, model, Path.cwd()).items():

@@ -1,7 +1,7 @@
 """The rig file: driver, address and warm-up time of each device, and the optics of the bench."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -396,8 +396,13 @@ def read_rig_file(path: str | Path) -> RigFile:
     """
     path = Path(path)
     require_kind(path, RIG)
+    return rig_of(read_yaml(path), path)
+
+
+def rig_of(content: Mapping[str, Any], path: Path) -> RigFile:
+    """Return the rig with the content of the file at `path`, as `read_rig_file` does."""
     folder = path.resolve().parent
-    content = with_absolute_paths(read_yaml(path), RigFile, folder)
+    content = with_absolute_paths(content, RigFile, folder)
     if isinstance(devices := content.get("devices"), dict):
         content["devices"] = {
             key: _device_with_absolute_paths(key, entry, folder) for key, entry in devices.items()

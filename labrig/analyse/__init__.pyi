@@ -19,7 +19,6 @@ from .luminance_table import (
 )
 from .overrides import (
     Overrides as Overrides,
-    read_run_protocol as read_run_protocol,
 )
 from .process_options import (
     ProcessOptions as ProcessOptions,

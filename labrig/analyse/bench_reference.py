@@ -44,7 +44,8 @@ def reference_of(context: AnalysisContext, result: RunResult) -> ReferenceFile |
 
     Examples
     --------
-    >>> from labrig.analyse import AnalysisContext, Inputs, Overrides, read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
+    >>> from labrig.analyse import AnalysisContext, Inputs, Overrides
     >>> from labrig.analyse import reference_of
     >>> import labrig
     >>> run, result = labrig.read_run("runs/decay"), labrig.read_result("runs/decay")

@@ -6,44 +6,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
-from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
+from labrig.acquire import EDITED, Optics, ProtocolModel, RigFile, read_run_protocol, read_run_rig
+from labrig.analyse.process_options import flag
 from labrig.foundation.errors import UsageError
 from labrig.foundation.named_files import with_absolute_paths
 from labrig.foundation.region import Region, parse_region
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.record import FileRecord
 
-
-def read_run_protocol(run: Path) -> ProtocolModel:
-    """Read the protocol in a run folder.
-
-    Parameters
-    ----------
-    run
-        A run folder.
-
-    Returns
-    -------
-    ProtocolModel
-        The protocol as it was when the run was recorded.
-
-    Raises
-    ------
-    UsageError
-        The folder has no protocol.yaml, or it is malformed.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from labrig.analyse import read_run_protocol
-    >>> protocol = read_run_protocol(Path("runs/decay"))
-    >>> protocol.protocol, protocol.sample.name, list(protocol.patches)
-    ('decay', 'sample', ['sample'])
-    """
-    path = run / "protocol.yaml"
-    if not path.is_file():
-        raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
-    return read_protocol(path)
+#: Options each of whose values is another one: a patch, a frame, a key of the rig file.
+_REPEATABLE = {"--roi", "--exclude", "--optics"}
 
 
 @dataclass(frozen=True)
@@ -62,6 +34,8 @@ class Overrides:
         Keys of the rig file's `optics:` to replace: calibrations that were made later.
     options
         The measurement's own options by name, such as `states` of a decay.
+    edited
+        Whether protocol and rig are those of the files as they are now, instead of the journal's.
     """
 
     regions: Mapping[str, Region] = field(default_factory=dict)
@@ -69,6 +43,7 @@ class Overrides:
     camera: str | None = None
     optics: Mapping[str, str] = field(default_factory=dict)
     options: Mapping[str, Any] = field(default_factory=dict)
+    edited: bool = False
 
     @classmethod
     def parse(
@@ -111,6 +86,40 @@ class Overrides:
             dict(options),
         )
 
+    def given(self) -> tuple[str, ...]:
+        """Return what was given as options of a command line, such as `--states 2`."""
+        regions = {
+            f"{name}=" if name else "": ",".join(f"{each:g}" for each in region)
+            for name, region in self.regions.items()
+        }
+        texts = [f"--roi {name}{region}" for name, region in regions.items()]
+        texts += [f"--exclude {name}" for name in sorted(self.excluded)]
+        texts += [] if self.camera is None else [f"--camera {self.camera}"]
+        texts += [f"--optics {key}={path}" for key, path in self.optics.items()]
+        for name, value in self.options.items():
+            if isinstance(value, list | tuple):
+                texts += [f"{flag(name)} {each}" for each in value]
+            elif value is not None and value is not False:
+                texts.append(flag(name) if value is True else f"{flag(name)} {value}")
+        return (*texts, EDITED) if self.edited else tuple(texts)
+
+    def not_kept(self, before: Sequence[str]) -> list[str]:
+        """Return the options among those given before that are neither given again nor replaced."""
+        now = self.given()
+        flags = {text.split()[0] for text in now} - _REPEATABLE
+        keys = set(map(_key, now))
+        return [text for text in before if text.split()[0] not in flags and _key(text) not in keys]
+
+    def protocol(self, run: Path) -> ProtocolModel:
+        """Return the protocol of a run.
+
+        Raises
+        ------
+        UsageError
+            This is no run folder, or the protocol is malformed.
+        """
+        return read_run_protocol(run, edited=self.edited)
+
     def bench(self, run: Path) -> RigFile:
         """Return the rig of a run as it was, with the user's calibrations instead.
 
@@ -119,7 +128,7 @@ class Overrides:
         UsageError
             The rig file in the run folder is malformed.
         """
-        rig = read_rig_file(run / "rig.yaml")
+        rig = read_run_rig(run, edited=self.edited)
         return rig.model_copy(update={"optics": rig.optics.model_copy(update=dict(self.optics))})
 
     def patches(self, protocol: Any) -> dict[str, Region]:
@@ -157,16 +166,27 @@ class Overrides:
         unknown = self.excluded.difference(*(_names(frame) for frame in frames))
         if unknown:
             there = f"; it has {frames[0].path.name} to {frames[-1].path.name}" if frames else ""
-            raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}")
+            raise UsageError(
+                f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}; give one by "
+                "its number or name, and repeat the option for several"
+            )
+
+
+def _key(option: str) -> str:
+    """Return the part of an option that names what it is about: its flag, a patch, a frame."""
+    key, is_named, _ = option.partition("=")
+    return "--roi" if key.startswith("--roi ") and not is_named else key
 
 
 def _parse_calibration(text: str) -> tuple[str, str]:
     """Return key and absolute path of a calibration."""
     key, _, named = text.partition("=")
     if key not in Optics.model_fields or not named:
+        is_known = key in Optics.model_fields
+        hint = f"such as {key}=PATH" if is_known else did_you_mean(key, list(Optics.model_fields))
         raise UsageError(
             f"--optics: expected KEY=PATH with a key of 'optics:' in a rig file, got '{text}'; "
-            f"{did_you_mean(key, list(Optics.model_fields))}"
+            f"{hint}"
         )
     return key, with_absolute_paths({key: named}, Optics, Path.cwd())[key]
 

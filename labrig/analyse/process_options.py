@@ -1,5 +1,6 @@
 """Options of `labrig process` that belong to measurements, as models that each registers."""
 
+import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -85,7 +86,8 @@ def options_of(protocol: Any) -> list[type[ProcessOptions]]:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.analyse import options_of, read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
+    >>> from labrig.analyse import options_of
     >>> [options.__name__ for options in options_of(read_run_protocol(Path("runs/decay")))]
     ['DecayOptions']
     """
@@ -112,7 +114,8 @@ def check_options(given: Mapping[str, Any], protocol: Any) -> None:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.analyse import check_options, read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
+    >>> from labrig.analyse import check_options
     >>> decay = read_run_protocol(Path("runs/decay"))
     >>> check_options({"states": 2}, decay)
     >>> check_options({"order": 2}, decay)
@@ -153,10 +156,15 @@ def chosen_options(model: type[OptionsT], given: Mapping[str, Any]) -> OptionsT:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.analyse import chosen_options, options_of, read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
+    >>> from labrig.analyse import chosen_options, options_of
     >>> (options,) = options_of(read_run_protocol(Path("runs/decay")))
     >>> chosen_options(options, {"states": 2, "order": "free"}).states
     2
     """
     own = {flag(name): value for name, value in given.items() if name in model.model_fields}
-    return validate(own, model, "options")
+    try:
+        return validate(own, model, "options")
+    except UsageError as error:
+        # On a command line the values of an option that is repeated have no numbers.
+        raise UsageError(re.sub(r"^options: (--[\w-]+)(\.\d+)?", r"\1", str(error))) from None

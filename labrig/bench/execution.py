@@ -425,13 +425,13 @@ def _offers(
 
 @contextmanager
 def _naming_own_files(folder: RunFolder) -> Iterator[None]:
-    """Name the run's own protocol and rig file if what they ask for is impossible."""
+    """Name the run's own protocol and rig file, and how edits of them are taken."""
     try:
         yield
     except ProtocolError as error:
         if folder.read().attempts:
             files = " and ".join(str(folder.path / name) for name in ("protocol.yaml", "rig.yaml"))
-            error.args = (f"{error} (this run's own files are {files})",)
+            error.args = (f"{error}; to go on otherwise, edit {files} and resume with --edited",)
         raise
 
 
@@ -487,19 +487,12 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
 
 
 def _changes(protocol: ProtocolModel, record: RunRecord) -> Iterator[str]:
-    """Yield warnings about a protocol file that is another than when the run began."""
-    now = {"protocol": protocol.protocol, "sample": protocol.sample.name}
-    for key, value in now.items():
-        if (before := record.began_with(key)) not in ("", value):
-            yield (
-                f"protocol.yaml was changed since the run began: its {key} is '{value}', in the "
-                f"journal it is '{before}'"
-            )
+    """Yield a warning of complete units that the protocol, as it was edited, no longer has."""
     units = {unit.name for unit in protocol.units()}
     if gone := [name for name in record.completed() if name not in units]:
         yield (
-            f"protocol.yaml was changed since the run began: it no longer has the units "
-            f"{_listed(gone)}, which are complete"
+            f"protocol.yaml was edited: it no longer has the units {_listed(gone)}, which are "
+            "complete"
         )
 
 

@@ -17,6 +17,8 @@ from labrig.acquire import (
     planned_rig,
     read_protocol,
     read_rig_file,
+    read_run_protocol,
+    read_run_rig,
 )
 from labrig.bench.execution import Watch, execute
 from labrig.bench.found_calibrations import FoundCalibrations, find_calibrations
@@ -28,7 +30,15 @@ from labrig.foundation import resources
 from labrig.foundation.errors import DiskError, MissingDeviceError, ProtocolError, UsageError
 from labrig.foundation.plugins import bench_check
 from labrig.foundation.yaml_file import read_yaml, yaml_text
-from labrig.record import CALIBRATIONS_FILE, JOURNAL, RunFolder, RunSize, read_run, size_text
+from labrig.record import (
+    CALIBRATIONS_FILE,
+    JOURNAL,
+    RunFolder,
+    RunSize,
+    lost_files,
+    read_run,
+    size_text,
+)
 
 #: Consequence of the lack of a curve, by its key under `optics:`.
 _CURVES = {
@@ -198,7 +208,13 @@ def _refuse(question: str) -> bool:
     return False
 
 
-def resume_run(path: Path, watch: Watch, confirm: Callable[[str], bool] = _refuse) -> Path:
+def resume_run(
+    path: Path,
+    watch: Watch,
+    confirm: Callable[[str], bool] = _refuse,
+    *,
+    edited: bool = False,
+) -> Path:
     """Complete a run: units that were not finished are done, again if need be.
 
     Parameters
@@ -209,6 +225,9 @@ def resume_run(path: Path, watch: Watch, confirm: Callable[[str], bool] = _refus
         What is told of steps and devices, and asked for what is done by hand.
     confirm
         Function that answers whether to record again what the journal has lost.
+    edited
+        Whether protocol and rig are taken as their files were edited since, and written into the
+        journal; else they are those of the journal.
 
     Returns
     -------
@@ -231,10 +250,8 @@ def resume_run(path: Path, watch: Watch, confirm: Callable[[str], bool] = _refus
     Traceback (most recent call last):
     labrig.foundation.errors.UsageError: somewhere: expected a run folder ...
     """
-    if not (path / "protocol.yaml").is_file():
-        raise UsageError(f"{path}: expected a run folder with protocol.yaml in it; see --runs")
-    protocol = read_protocol(path / "protocol.yaml")
-    rig = read_rig_file(path / "rig.yaml")
+    protocol = read_run_protocol(path, edited=edited)
+    rig = read_run_rig(path, edited=edited)
     last_time, done = 0.0, frozenset[str]()
     if (path / "journal.jsonl").exists():
         record = read_run(path)
@@ -247,6 +264,8 @@ def resume_run(path: Path, watch: Watch, confirm: Callable[[str], bool] = _refus
         run_log(path, rig.name, bench.clock),
     ):
         _confirm_losses(folder, confirm)
+        if edited:
+            folder.take_edits()
         execute(folder, protocol, bench, run_plan, watch)
     return path
 
@@ -259,7 +278,7 @@ def _confirm_losses(folder: RunFolder, confirm: Callable[[str], bool]) -> None:
     UsageError
         Nobody confirmed it.
     """
-    if not (lost := folder.lost_files()):
+    if not (lost := lost_files(folder.path, folder.read().attempts)):
         return
     done = list(folder.read().completed())
     kept = (

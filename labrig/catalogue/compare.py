@@ -9,11 +9,18 @@ from typing import Any
 import numpy as np
 from scipy.special import chdtrc
 
+from labrig.catalogue.comparable import not_comparable
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, DiskError, UsageError
 from labrig.foundation.result_warning import Disturbance, ResultWarning
-from labrig.foundation.yaml_file import did_you_mean, read_yaml
-from labrig.record import FrameRole, glow_temperature_c, read_run, relative_rate_change
+from labrig.foundation.yaml_file import did_you_mean
+from labrig.record import (
+    FrameRole,
+    glow_temperature_c,
+    plan_content,
+    read_run,
+    relative_rate_change,
+)
 from labrig.results import (
     EXPONENTIALS,
     LAW_LABELS,
@@ -232,9 +239,9 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     Raises
     ------
     DataError
-        If one of the runs has no result.
+        If one of the runs has no result yet.
     UsageError
-        If the reference is not a patch of both runs.
+        If one of them is of a kind that fits no decay, or the reference is not a patch of both.
 
     Examples
     --------
@@ -246,10 +253,12 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     >>> [difference.quantity for difference in comparison.patches[0].differences]
     ['k_r 1', 'k_r 2', 'a 1', 'a 2']
     """
-    protocols = read_yaml(a / "protocol.yaml"), read_yaml(b / "protocol.yaml")
+    protocols = plan_content(a, "protocol.yaml"), plan_content(b, "protocol.yaml")
     results_a, results_b = (
         _results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True)
     )
+    if (error := not_comparable(a, b, (bool(results_a), bool(results_b)))) is not None:
+        raise error
     if len(results_a) == len(results_b) == 1:  # the one patch, whatever it is called
         results_b = dict(zip(results_a, results_b.values(), strict=True))
     shared = [name for name in results_a if name in results_b and name != reference]
@@ -338,17 +347,16 @@ def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:
     """Return the fits of a run by patch, also where it has one patch only."""
     only = next(iter(protocol.get("patches") or ["sample"]))
     read = read_fitted_decays(run / "result")
-    results = {name or only: result for name, result in read.items()}
-    if not results:
-        raise DataError(f"{run}: it has no result to compare; make one: labrig process {run}")
-    return results
+    return {name or only: result for name, result in read.items()}
 
 
 def _differing(
     a: Mapping[str, Any], b: Mapping[str, Any], place: str = ""
 ) -> list[tuple[str, Any, Any]]:
     differences: list[tuple[str, Any, Any]] = []
-    for key in dict.fromkeys([*a, *b]):
+    # Of protocols of two kinds, only keys that both have are to be compared.
+    is_alike = a.get("protocol") == b.get("protocol")
+    for key in dict.fromkeys([*a, *b]) if is_alike else [key for key in a if key in b]:
         value_a, value_b = a.get(key), b.get(key)
         if isinstance(value_a, dict) and isinstance(value_b, dict):
             differences += _differing(value_a, value_b, f"{place}{key}.")

@@ -15,7 +15,7 @@ from fnmatch import fnmatchcase
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 from zlib import crc32
 
 from labrig.catalogue.run_summary import STATUSES, RunSummary
@@ -28,10 +28,16 @@ from labrig.foundation.output_file import write_durably
 from labrig.record import require_plain_folder, time_made
 from labrig.results import SUMMARY
 
+if TYPE_CHECKING:
+    from labrig.results import Measured
+
 FILE = ".runs-index"
 PROTOCOL = "protocol.yaml"
 #: Files on which every run's summary depends; the fits in its result are added to them.
-FILES = (PROTOCOL, "made.txt", "journal.jsonl", "result", f"result/{SUMMARY}")
+FILES = (
+    *(PROTOCOL, "made.txt", "journal.jsonl"),
+    *("result", f"result/{SUMMARY}", "result/result.json"),
+)
 #: Modules whose code decides what a summary says.
 _MODULES = (
     "catalogue/index.py",
@@ -39,6 +45,7 @@ _MODULES = (
     "catalogue/summarising.py",
     "results/fitted_decay.py",
     "results/fitted_decay_file.py",
+    "results/headline_values.py",
     "results/measured.py",
     "results/summary.py",
 )
@@ -77,12 +84,9 @@ class _Entry:
                 "units": summary.units,
                 "frames": summary.frames,
                 "parameters": {
-                    place: {
-                        name: [each.value, each.sigma, each.unit]
-                        for name, each in parameters.items()
-                    }
-                    for place, parameters in summary.parameters.items()
+                    place: _plain(parameters) for place, parameters in summary.parameters.items()
                 },
+                "values": _plain(summary.values),
                 "headline": summary.headline,
             },
         )
@@ -101,8 +105,10 @@ class _Entry:
         began = content["began"]
         content["made"] = datetime.fromisoformat(content["made"])
         content["began"] = None if began is None else datetime.fromisoformat(began)
-        if content["parameters"]:
-            content["parameters"] = _measured(content["parameters"])
+        content["parameters"] = {
+            place: _measured(parameters) for place, parameters in content["parameters"].items()
+        }
+        content["values"] = _measured(content["values"])
         return RunSummary(folder=run, **content)
 
 
@@ -170,13 +176,16 @@ def _stamp(path: str) -> Stamp:
     return [status.st_mtime_ns, status.st_ino, status.st_size]
 
 
-def _measured(parameters: Mapping[str, Mapping[str, Sequence[Any]]]) -> dict[str, Any]:
-    from labrig.results import Measured
+def _plain(quantities: "Mapping[str, Measured]") -> dict[str, tuple[float, float, str]]:
+    return {name: (each.value, each.sigma, each.unit) for name, each in quantities.items()}
 
-    return {
-        place: {name: Measured(*each) for name, each in of_place.items()}
-        for place, of_place in parameters.items()
-    }
+
+def _measured(quantities: Mapping[str, Sequence[Any]]) -> "dict[str, Measured]":
+    if not quantities:
+        return {}
+    from labrig.results import Measured  # not for a list of runs without results
+
+    return {name: Measured(*each) for name, each in quantities.items()}
 
 
 def _read_index(runs: Path) -> dict[str, _Entry]:
@@ -339,14 +348,17 @@ def _find_folder(run: Path, runs: Path) -> Path:
         require_kind(run, RUN)
     if not matches and run.exists() and (around := run_around(run)) is not None:
         raise UsageError(f"{run}: this is a part of a run; the run is {around}")
-    problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
-    names = [path.name for path in _run_folders(runs, "")]
-    close = get_close_matches(str(run), names, n=1)
-    suggestion = f"; did you mean '{close[0]}'?" if close and not matches else ""
+    problem = f"{len(matches)} runs begin so" if matches else _no_such_run(str(run), runs)
     raise UsageError(
-        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "
-        f"labrig runs --runs {runs}{suggestion}"
+        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}; see: "
+        f"labrig runs --runs {runs}"
     )
+
+
+def _no_such_run(name: str, runs: Path) -> str:
+
+    near = get_close_matches(name, [path.name for path in _run_folders(runs, "")], 1)
+    return f"there is no such run, did you mean '{near[0]}'?" if near else "there is no such run"
 
 
 def _run_folders(runs: Path, beginning: str) -> Iterator[Path]:

@@ -52,6 +52,8 @@ class RunSummary:
         What tells the course of each decay, by name: rates, or the parameters of the law that
         describes it; by the folder of its fit in the result, such as `decay/left-paint`, which is
         "" if the fit lies in the result itself.
+    values
+        Headline values of the result with σ and unit, by their names.
     headline
         What the result says first, for people; "" if there is no result.
     """
@@ -66,6 +68,7 @@ class RunSummary:
     units: int | None
     frames: int
     parameters: "Mapping[str, Mapping[str, Measured]]"
+    values: "Mapping[str, Measured]"
     headline: str = ""
 
     def at_present(self) -> "RunSummary":

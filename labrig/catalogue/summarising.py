@@ -2,12 +2,11 @@
 
 from pathlib import Path
 
-from labrig.acquire import read_protocol
+from labrig.acquire import read_run_protocol
 from labrig.catalogue.run_summary import RunStatus, RunSummary, status_of, utc
 from labrig.foundation.errors import DataError, DiskError, LabrigError
-from labrig.foundation.yaml_file import read_yaml
-from labrig.record import read_run, time_made
-from labrig.results import fits_by_folder, read_fitted_decay, read_summary
+from labrig.record import plan_content, read_run, time_made
+from labrig.results import fits_by_folder, headline_values, read_fitted_decay, read_summary
 
 
 def summarise(folder: Path) -> RunSummary:
@@ -39,7 +38,7 @@ def summarise(folder: Path) -> RunSummary:
     except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
         status: RunStatus = "damaged" if has_journal else "interrupted"
-        return RunSummary(folder, sample, protocol, made, None, status, 0, number, 0, {})
+        return RunSummary(folder, sample, protocol, made, None, status, 0, number, 0, {}, {})
     # The files beside it may have been edited since.
     sample = record.began_with("sample") or sample
     protocol = record.began_with("protocol") or protocol
@@ -63,6 +62,7 @@ def summarise(folder: Path) -> RunSummary:
         units=number,
         frames=sum(len(attempt.frames) for attempt in completed.values()),
         parameters=parameters,
+        values=headline_values(folder / "result"),
         headline=next(iter(read_summary(folder / "result")), ""),
     )
 
@@ -72,19 +72,18 @@ def _protocol_summary(folder: Path) -> tuple[str, str, tuple[str, ...] | None]:
 
     The names are None if the protocol is not installed.
     """
-    path = folder / "protocol.yaml"
     try:
-        protocol = read_protocol(path)
+        protocol = read_run_protocol(folder)
         units = tuple(unit.name for unit in protocol.units())
     except LabrigError:
-        return *_names_in(path), None
+        return *_names_in(folder), None
     return protocol.sample.name, protocol.protocol, units
 
 
-def _names_in(protocol: Path) -> tuple[str, str]:
-    """Return sample and protocol of a file that no installed protocol reads, `?` if it has none."""
+def _names_in(folder: Path) -> tuple[str, str]:
+    """Return sample and protocol of a run that no installed protocol reads, `?` if it has none."""
     try:
-        content = read_yaml(protocol)
+        content = plan_content(folder, "protocol.yaml")
     except LabrigError:
         return "?", "?"
     sample = content.get("sample")

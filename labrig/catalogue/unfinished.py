@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 from labrig.catalogue.run_summary import RunSummary, utc
-from labrig.foundation.errors import DataError, DiskError, LabrigError
+from labrig.foundation.errors import DataError, DiskError
 from labrig.foundation.signals import name_of
-from labrig.record import JOURNAL, RunRecord, read_run
+from labrig.record import JOURNAL, RunRecord, lost_files, read_run
 
 CUT_OFF = "labrig was cut off: killed, or this PC lost power"
 
@@ -40,15 +40,22 @@ def _lines(summary: RunSummary) -> Iterator[str]:
     if summary.status == "recorded":
         yield f"all units are recorded; go on with: labrig process {folder}"
         return
-    if not (folder / JOURNAL).exists():
+    has_journal = (folder / JOURNAL).exists()
+    try:
+        record = read_run(folder) if has_journal else None
+    except (DataError, DiskError) as error:
+        yield str(error)
+        return
+    if lost := lost_files(folder, record.attempts if record else ()):
+        yield (
+            f"its journal {'was cut' if has_journal else 'is gone'}: {len(lost)} frames have no "
+            f"line in it, {lost[0]} to {lost[-1]}; restore it from a copy, or record them again: "
+            f"labrig resume {folder} --yes"
+        )
+        return
+    if record is None:
         yield f"nothing was recorded; go on with: labrig resume {folder}"
         return
-    try:
-        record = read_run(folder)
-    except (DataError, DiskError) as error:
-        yield f"{error}; restore it from a copy"
-        return
-    yield from _changed(summary, record)
     if summary.status == "damaged":
         yield f"its result cannot be read; make it anew with: labrig process {folder}"
         return
@@ -73,18 +80,3 @@ def _reason(reason: str) -> str:
     """Return the reason of a RunStop, a signal by its name."""
     number = reason.removeprefix("signal ")
     return f"by {name_of(int(number))}" if number != reason and number.isdecimal() else reason
-
-
-def _changed(summary: RunSummary, record: RunRecord) -> Iterator[str]:
-    """Yield what the run's protocol file says otherwise than its journal."""
-    from labrig.acquire import read_protocol
-
-    try:
-        protocol = read_protocol(summary.folder / "protocol.yaml")
-    except LabrigError as error:
-        yield f"{error}"
-        return
-    now = {"protocol": protocol.protocol, "sample": protocol.sample.name}
-    for key, value in now.items():
-        if (before := record.began_with(key)) not in ("", value):
-            yield f"protocol.yaml was changed: its {key} is '{value}', in the journal '{before}'"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from labrig.cli.detachable_stream import DetachableStream
+from labrig.cli.screen import laid_out, terminal_width
 from labrig.cli.under_way import showing_work
 from labrig.foundation.activity import checking
 from labrig.foundation.clock import Interrupted
@@ -129,6 +130,8 @@ def _wrong_call(error: "TyperException") -> str:
         message = message.replace(problems[0]["msg"], reason)
     context = getattr(error, "ctx", None)
     command = "labrig" if context is None else context.command_path
+    # Some commands show all their options only for what is named.
+    command = getattr(getattr(context, "command", None), "helped_by", command)
     options = () if context is None else [each.opts for each in context.command.params]
     if "'%Y-%m-%d'" in message:
         message = re.sub("does not match the formats.*", "is no day such as 2026-11-21", message)
@@ -169,5 +172,8 @@ def _print_shortage(error: Exception) -> int:
 
 
 def _print_error(text: str, code: int) -> int:
-    print(f"labrig: {' '.join(text.split())}", file=DetachableStream(sys.stderr), flush=True)
+    line = f"labrig: {' '.join(text.split())}"
+    width = terminal_width(sys.stderr)
+    laid = [line] if width is None else laid_out(line, width)
+    print("\n".join(laid), file=DetachableStream(sys.stderr), flush=True)
     return code

@@ -1,5 +1,7 @@
 """`labrig process`: from a recorded run to its result."""
 
+import shlex
+from dataclasses import replace
 from functools import cache
 from inspect import Parameter, Signature
 from itertools import pairwise
@@ -10,6 +12,7 @@ import typer
 from typer.core import TyperCommand
 
 from labrig.cli.completion import complete_run
+from labrig.cli.wording import EDITED
 from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
@@ -21,6 +24,8 @@ GIVEN, _WORDS, _SHOWN = "labrig.options", "labrig.words", "labrig.shown"
 
 class ProcessCommand(TyperCommand):
     """Command that takes every measurement's options, and shows those of the run that is named."""
+
+    helped_by = "labrig process RUN"
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the words of the line, which help needs to find the run."""
@@ -45,7 +50,8 @@ class ProcessCommand(TyperCommand):
 
 def _options_of_run(words: tuple[str, ...]) -> "list[type[ProcessOptions]]":
     """Return the options of the first run that is named; none where none is."""
-    from labrig.analyse import options_of, read_run_protocol
+    from labrig.acquire import read_run_protocol
+    from labrig.analyse import options_of
     from labrig.catalogue import find_run
     from labrig.foundation.errors import LabrigError
 
@@ -141,20 +147,32 @@ def process(
             "looks untouched.",
         ),
     ] = False,
+    edited: Annotated[
+        bool,
+        typer.Option(
+            EDITED,
+            help="Take protocol.yaml and rig.yaml of the run folder as they were edited since, "
+            "instead of what the journal has of them.",
+        ),
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Reduce, fit and report a run again, and say what changed.
 
-    Measurements have options of their own: 'labrig process RUN --help' shows those of a run. An
-    earlier result that differs is kept as result-1, result-2, … What was reduced from the frames
-    before is used again, unless a region or a calibration that it depends on is another one.
+    Each call starts from the settings of the run's protocol and rig: options of an earlier call are
+    not kept unless they are given again, and the command says which. Measurements have options of
+    their own: 'labrig process RUN --help' shows those of a run. An earlier result that differs is
+    kept as result-1, result-2, … What was reduced from the frames before is used again, unless a
+    region or a calibration that it depends on is another one.
     """
     from labrig.analyse import Overrides, verify_frames
     from labrig.catalogue import find_run
     from labrig.record import discard_cache, read_run
 
     options = context.meta.get(GIVEN, {})
-    overrides = Overrides.parse(roi or [], exclude or [], camera, optics or [], options)
+    overrides = replace(
+        Overrides.parse(roi or [], exclude or [], camera, optics or [], options), edited=edited
+    )
     folder = find_run(run, runs)
     if verify:
         discard_cache(folder)
@@ -163,13 +181,33 @@ def process(
     typer.echo(folder)
 
 
+def print_edits(run: Path, *, is_taken: bool) -> None:
+    """Print what was edited in a run's files since its journal has them, and what is used."""
+    from labrig.record import edited_keys
+
+    used = "the file's is used" if is_taken else f"the journal's is used; {EDITED} takes the file's"
+    for line in edited_keys(run):
+        typer.echo(f"note: {line}; {used}", err=True)
+
+
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
     """Process the run in the folder `run` and print its result."""
+    from labrig.analyse import Overrides
     from labrig.foundation.activity import activity
     from labrig.process import process_and_report
 
+    overrides = overrides or Overrides()
+    print_edits(run, is_taken=overrides.edited)
     with activity(f"processing {run.name}"):
         processed = process_and_report(run, overrides)
+    if processed.not_kept:
+        again = " ".join(map(_quoted, (*processed.not_kept, *overrides.given())))
+        typer.echo(
+            f"note: not kept from the result before: {', '.join(processed.not_kept)}; each "
+            "processing starts from the protocol; to keep them: labrig process "
+            f"{shlex.quote(str(run))} {again}",
+            err=True,
+        )
     if json:
         typer.echo(processed.result.to_json())
         return
@@ -180,3 +218,9 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
     for number, line in enumerate(processed.changes):
         typer.echo(f"  {line}" if number else line)
     typer.echo(f"report: {processed.report}")
+
+
+def _quoted(option: str) -> str:
+    """Return an option and its value as a shell takes them."""
+    name, blank, value = option.partition(" ")
+    return f"{name} {shlex.quote(value)}" if blank else name

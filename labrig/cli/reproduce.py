@@ -171,7 +171,7 @@ def _check_for_fluorescence(
     if material:
         raise UsageError(
             f"{folder}: expected no --material for a run of validate_illuminants; name other "
-            "materials as 'fluorescence:' in its protocol.yaml, and process it again"
+            "materials as 'fluorescence:' in its protocol.yaml, and process it again with --edited"
         )
     if assume_albedo is not None or assume_scale is not None:
         raise UsageError(

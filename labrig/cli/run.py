@@ -12,6 +12,7 @@ from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.detachable_stream import DetachableStream
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.cli.protocol import protocol_path
+from labrig.cli.wording import EDITED
 from labrig.foundation.activity import activity
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import UsageError
@@ -124,6 +125,14 @@ def resume(
     no_process: NoProcess = False,
     on_finish: OnFinish = False,
     verbose: Verbose = False,
+    edited: Annotated[
+        bool,
+        typer.Option(
+            EDITED,
+            help="Go on by protocol.yaml and rig.yaml of the run folder as they were edited since, "
+            "instead of what the journal has of them; they are written into it.",
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Go on with a run that was interrupted: completed units are kept, the rest is done.
@@ -131,21 +140,23 @@ def resume(
     If only the result is missing, the run is processed.
     """
     with activity("preparing the run"):
-        from labrig.acquire import read_rig_file
+        from labrig.acquire import read_run_rig
         from labrig.bench import resume_run
         from labrig.catalogue import find_run, summarise
         from labrig.cli.on_finish import notify_at_end, permitted
+        from labrig.cli.process import print_edits
         from labrig.cli.progress import progress
 
         folder = find_run(run, runs)
         is_processed = summarise(folder).status == "processed"
+        print_edits(folder, is_taken=edited)
     path = folder / "rig.yaml"
-    rig = read_rig_file(path) if path.is_file() else None
+    rig = read_run_rig(folder, edited=edited) if path.is_file() else None
     has_changer = rig is not None and "changer" in rig.devices
     watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
     at_end = permitted(None if rig is None else rig.on_finish, path, is_asked_for=on_finish)
     with notify_at_end(at_end) as ending:
-        resume_run(folder, watch, partial(_confirmed, yes=yes))
+        resume_run(folder, watch, partial(_confirmed, yes=yes), edited=edited)
         if is_processed:
             _print_processed(folder, json)
         else:

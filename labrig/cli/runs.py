@@ -2,7 +2,9 @@
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+import shutil
+import sys
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,17 +13,14 @@ import typer
 from typer.core import TyperGroup
 
 from labrig.cli.completion import complete_protocol, complete_run
+from labrig.cli.inline_picture import InlinePictures
+from labrig.cli.runs_table import printable, progress_text, runs_csv, samples_table
 from labrig.cli.wording import counted, measurement
 from labrig.foundation.errors import UsageError
 from labrig.foundation.result_warning import warning_lines
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
-    from labrig.results import Measured
-
-
-#: Longest result that is listed in one line of a run.
-HEADLINE_LENGTH = 100
 
 
 class _ListsByDefault(TyperGroup):
@@ -65,14 +64,6 @@ Status = Annotated[
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print as JSON.")]
 
-_COLOURS = {
-    "running": "blue",
-    "interrupted": "yellow",
-    "failed": "red",
-    "damaged": "red",
-    "processed": "green",
-}
-
 
 @app.command("list")
 def list_them(
@@ -82,9 +73,21 @@ def list_them(
     since: Since = None,
     until: Until = None,
     status: Status = None,
+    csv: Annotated[
+        bool,
+        typer.Option("--csv", help="Print a row a run, with all headline values and their σ."),
+    ] = False,
+    thumbnails: Annotated[
+        bool,
+        typer.Option(
+            "--thumbnails/--no-thumbnails",
+            help="Pictures of the samples, where the terminal says that it shows some (kitty, "
+            "iTerm2).",
+        ),
+    ] = True,
     json: Json = False,
 ) -> None:
-    """One line a run: its name for other commands, which sample, how far it came, which rates.
+    """Samples with their runs: names for other commands, how far each run came, rates ± σ.
 
     The run that was made last is the last one; other commands also call it 'last'.
     """
@@ -92,6 +95,8 @@ def list_them(
 
     from labrig.catalogue import RunFilter, list_runs
 
+    if csv and json:
+        raise UsageError("expected --csv or --json, got both; give the one that you want to read")
     run_filter = RunFilter(
         sample,
         protocol,
@@ -102,8 +107,10 @@ def list_them(
     summaries = list_runs(runs, run_filter)
     if json:
         _print_json([_summary_json(run) for run in summaries])
+    elif csv:
+        typer.echo(runs_csv(summaries), nl=False)
     elif summaries:
-        _print_runs(summaries)
+        _print_runs(summaries, thumbnails=thumbnails)
     else:
         typer.echo(f"no such runs in {runs}")
 
@@ -112,21 +119,23 @@ def list_them(
 def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     """All there is to know of one run, its notes and earlier results included."""
     from labrig.catalogue import find_run, indexed_summary, unfinished
-    from labrig.record import read_notes
+    from labrig.record import edited_keys, read_notes
 
     folder = find_run(run, runs)
-    summary, notes = indexed_summary(folder), read_notes(folder)
+    summary, notes, edits = indexed_summary(folder), read_notes(folder), edited_keys(folder)
     if json:
-        about = {"notes": notes, "unfinished": unfinished(summary)}
+        about = {"notes": notes, "unfinished": unfinished(summary), "edited": edits}
         _print_json({**_summary_json(summary), **about})
         return
     typer.echo(f"{folder}")
     measured = measurement(summary.protocol, summary.sample)
-    typer.echo(f"  {measured}, {_when(summary)} UTC, {summary.status}")
+    typer.echo(f"  {measured}, {_when(summary)}, {summary.status}")
     units = "unit" if summary.units == 1 else "units"
-    typer.echo(f"  {_progress(summary)} {units}, {counted(summary.frames, 'frame')}")
+    typer.echo(f"  {progress_text(summary)} {units}, {counted(summary.frames, 'frame')}")
     for line in unfinished(summary):
-        typer.echo(f"  {_printable(line)}")
+        typer.echo(f"  {printable(line)}")
+    for line in edits:
+        typer.echo(f"  {printable(line)}; the journal's counts")
     _print_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():
@@ -166,13 +175,19 @@ def stack(
 ) -> None:
     """The frames of a decay as one TIFF of linear values, for ImageJ or napari; times in a CSV."""
     from labrig.analyse import Overrides, intact_frames
-    from labrig.catalogue import find_run
+    from labrig.catalogue import find_run, indexed_summary
     from labrig.export import write_image_stack
     from labrig.foundation.output_file import write_text
-    from labrig.record import read_run
+    from labrig.record import FrameRole, read_run
 
     folder = find_run(run, runs)
-    frames = intact_frames(read_run(folder), Overrides())
+    record, summary = read_run(folder), indexed_summary(folder)
+    if not record.frames(FrameRole.DECAY) and summary.done == summary.units:
+        raise UsageError(
+            f"{folder}: expected a run with frames of a decay, got one of {summary.protocol}, "
+            "which takes none"
+        )
+    frames = intact_frames(record, Overrides())
     path = out or folder / "result" / "decay.tif"
     ordered = sorted(frames.decay, key=lambda frame: frame.t_s)
     times, channels, rows, columns = write_image_stack(path, ordered, frames.dark, width)
@@ -285,40 +300,11 @@ def note(
     typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
 
 
-def _print_runs(summaries: Sequence["RunSummary"]) -> None:
-    """Print a table; never folded, so that every name can be copied."""
-    from rich.cells import cell_len
-
-    def padded(text: str, width: int) -> str:
-        return text + " " * (width - cell_len(text))
-
-    rows = [
-        (_printable(run.folder.name), _printable(run.sample), _status(run)) for run in summaries
-    ]
-    heading = ("run", "sample", "status")
-    last_heading = "result; of a decay k_r in 1/s, or its law"
-    widths = [max(map(cell_len, column)) for column in zip(heading, *rows, strict=True)]
-    lines = ["  ".join([*map(padded, heading, widths), last_heading])]
-    for run, (name, sample, status) in zip(summaries, rows, strict=True):
-        decays = [_printable(_decay_text(*decay)) for decay in run.parameters.items()] or [
-            _shortened(_printable(run.headline))
-        ]
-        cells = [padded(name, widths[0]), padded(sample, widths[1]), padded(status, widths[2])]
-        if run.status in _COLOURS:
-            cells[2] = typer.style(cells[2], fg=_COLOURS[run.status])
-        lines.append("  ".join([*cells, decays[0]]).rstrip())
-        lines += [" " * (sum(widths) + 6) + decay for decay in decays[1:]]
-    typer.echo("\n".join(lines))
-
-
-def _shortened(text: str) -> str:
-    text = " ".join(text.split())
-    return text if len(text) <= HEADLINE_LENGTH else f"{text[: HEADLINE_LENGTH - 2]} …"
-
-
-def _printable(text: str) -> str:
-    """Return text without what a terminal would take for a command."""
-    return "".join(character if character.isprintable() else "\ufffd" for character in text)
+def _print_runs(summaries: Sequence["RunSummary"], *, thumbnails: bool) -> None:
+    """Print the table of samples; whatever its width, every name can be copied."""
+    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    pictures = InlinePictures.of_terminal() if thumbnails else None
+    typer.echo(samples_table(summaries, columns, pictures))
 
 
 def _print_comparison(comparison: "Comparison") -> None:
@@ -366,7 +352,7 @@ def _print_results(folder: Path) -> None:
         if lines := read_summary(folder / result):
             typer.echo(f"  {result}:")
             for line in lines:
-                typer.echo(f"    {_printable(line)}")
+                typer.echo(f"    {printable(line)}")
         if before is not None:
             for line in other_settings(folder / before, folder / result):
                 typer.echo(f"    {line}")
@@ -381,27 +367,8 @@ def _result_folders(folder: Path) -> list[str]:
     return ["result", *earlier]
 
 
-def _decay_text(patch: str, parameters: Mapping[str, "Measured"]) -> str:
-    """Return the rates of a decay, or the parameters of its law with their symbols and units."""
-    from labrig.results import parameter_text, with_uncertainty
-
-    text = ",  ".join(
-        parameter_text(name, with_uncertainty(each.value, each.sigma))
-        for name, each in parameters.items()
-    )
-    return f"{patch}: {text}" if patch else text
-
-
 def _when(run: "RunSummary") -> str:
-    return "–" if run.began is None else f"{run.began:%Y-%m-%d %H:%M}"
-
-
-def _status(run: "RunSummary") -> str:
-    return run.status if run.done == run.units else f"{run.status}, {_progress(run)}"
-
-
-def _progress(run: "RunSummary") -> str:
-    return f"{run.done} of {'?' if run.units is None else run.units}"
+    return "not begun" if run.began is None else f"{run.began:%Y-%m-%d %H:%M} UTC"
 
 
 def _summary_json(run: "RunSummary") -> dict[str, object]:

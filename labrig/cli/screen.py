@@ -12,7 +12,6 @@ from textwrap import wrap
 from typing import Any, TextIO
 
 import typer
-from rich.cells import cell_len
 
 from labrig.foundation.number_format import aligned
 
@@ -22,7 +21,8 @@ MIN_WIDTH = 30
 MIN_SENTENCE = 24
 #: Spaces within a quantity: between a number and its unit or power, about `±` and `×`.
 _WITHIN_QUANTITY = re.compile(
-    r"(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹±×≤≥<>=]) (?=\S{1,6}(?:[\s,;:.)]|$))|(?<=\S) (?=[±×])"
+    r"(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=[^\d\s]\S{0,5}(?:[\s,;:.)]|$))"
+    r"|(?<=[±×≤≥<>=]) (?=\S)|(?<=\S) (?=[±×])"
 )
 #: Cells of a line, each with the spaces before it; cells are two spaces or more apart.
 _CELL = re.compile(r"(\s*)(\S+(?:\s\S+)*)")
@@ -36,7 +36,7 @@ def echo(text: object = "", *, err: bool = False, **style: Any) -> None:
     style
         Colour and weight, as `typer.style` takes them; a file or a pipe gets none.
     """
-    width = _width(sys.stderr if err else sys.stdout)
+    width = terminal_width(sys.stderr if err else sys.stdout)
     if width is not None:
         lines = (part for line in str(text).split("\n") for part in laid_out(line, width))
         text = "\n".join(lines)
@@ -49,11 +49,11 @@ def echo_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     The last column may be of sentences, which go on below their beginning.
     """
     lines = aligned([head, *rows])
-    width = _width(sys.stdout)
+    width = terminal_width(sys.stdout)
     if width is not None:
         *columns, last = zip(head, *rows, strict=True)
-        begins = sum(max(map(cell_len, column)) + 2 for column in columns)
-        needed = begins + min(max(map(cell_len, last)), MIN_SENTENCE)
+        begins = sum(max(map(_cells, column)) + 2 for column in columns)
+        needed = begins + min(max(map(_cells, last)), MIN_SENTENCE)
         lines = _stacked(head, rows) if needed > width else _continued(lines, begins, width)
     echo("\n".join(lines))
 
@@ -86,37 +86,40 @@ def laid_out(line: str, width: int, hanging: int | None = None) -> Iterator[str]
     hanging
         Column at which further lines begin; without it, that of the second cell.
     """
-    if cell_len(line) <= width or width < MIN_WIDTH:
+    if _cells(line) <= width or width < MIN_WIDTH:
         yield line
         return
     first = _CELL.match(line)
     second = first and _CELL.match(line, first.end())
-    indent = cell_len(first[1]) + 2 if first else 0
-    under_second = cell_len(line[: second.start(2)]) if second else indent
+    indent = _cells(first[1]) + 2 if first else 0
+    under_second = _cells(line[: second.start(2)]) if second else indent
     if hanging is None:
         hanging = under_second if under_second <= width // 2 else indent
     margin = " " * hanging
     fold = partial(wrap, width=width, break_long_words=False, break_on_hyphens=False)
     laid = ""
     for gap, cell in _CELL.findall(line):
-        if cell_len(laid + gap + cell) <= width:
+        if _cells(laid + gap + cell) <= width:
             laid += gap + cell
             continue
         whole = _WITHIN_QUANTITY.sub("\N{NO-BREAK SPACE}", cell)
-        if laid.strip() and cell_len(margin + cell) <= width:
-            yield laid
+        if laid.strip() and _cells(margin + cell) <= width:
+            yield laid.rstrip()
             start, gap = margin, ""
         else:
             start = laid
         *before, laid = fold(whole, initial_indent=start + gap, subsequent_indent=margin)
         yield from (part.replace("\N{NO-BREAK SPACE}", " ") for part in before)
         laid = laid.replace("\N{NO-BREAK SPACE}", " ")
-    yield laid
+    yield laid.rstrip()
 
 
-def _width(stream: TextIO) -> int | None:
+def terminal_width(stream: TextIO) -> int | None:
     """Return the width of the terminal behind a stream; None if it is no terminal."""
-    if not stream.isatty():
+    try:
+        if not stream.isatty():
+            return None
+    except ValueError:  # it is closed
         return None
     columns = os.environ.get("COLUMNS", "")
     if columns.isdecimal() and int(columns):
@@ -125,3 +128,10 @@ def _width(stream: TextIO) -> int | None:
         return os.get_terminal_size(stream.fileno()).columns or None
     except (OSError, ValueError):
         return None
+
+
+def _cells(text: str) -> int:
+    """Return how many cells of a terminal a text takes."""
+    from rich.cells import cell_len  # takes longer to load than most commands' other output
+
+    return cell_len(text)

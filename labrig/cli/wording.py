@@ -1,5 +1,7 @@
 """Parts of sentences that several commands print."""
 
+#: Option that takes the edits of a run's files.
+EDITED = "--edited"
 #: Name of a sample that a protocol does not name.
 _UNNAMED = "sample"
 

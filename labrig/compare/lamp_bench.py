@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import read_result_rig
 from labrig.bench_optics import with_shipped_camera
 from labrig.compare.photographed_room import (
     DarkRoomScene,
@@ -91,7 +91,7 @@ class LampBench:
         self, folder: Path, result: PredictedUnderLamps, camera: CameraResponse, place: Path
     ) -> None:
         run = read_run(folder)
-        rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), run.camera_identity)
+        rig = with_shipped_camera(read_result_rig(folder), run.camera_identity)
         if rig.optics.grey_card is None:
             raise UsageError(f"rig '{rig.name}': expected 'grey_card' under 'optics:', got none")
         frames = run.frames(FrameRole.DARK)
@@ -224,7 +224,8 @@ class LampBench:
         if not numerator > 0:
             raise DataError(
                 f"{lamp}: no sample shines under this lamp, of which the camera sees next to "
-                "nothing; leave it out of 'lamps:' in the run's protocol.yaml, and process again"
+                "nothing; leave it out of 'lamps:' in the run's protocol.yaml, and process it "
+                "again with --edited"
             )
         strength = numerator / denominator
         own = {name: strength * evenness[name] * camera for name in patches}

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import read_result_rig
 from labrig.bench_optics import with_shipped_camera
 from labrig.compare.glow import GlowComparison, compare_scaled, glow_sigma
 from labrig.compare.nalbach2017 import emission
@@ -286,7 +286,7 @@ def compare_rendered(
     curves, reasons = measured_camera(folder, camera)
     if curves is None:
         raise UsageError(f"the dark room cannot be rendered: {reasons[0]}")
-    rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), read_run(folder).camera_identity)
+    rig = with_shipped_camera(read_result_rig(folder), read_run(folder).camera_identity)
     result = read_result(folder)
     room = PhotographedRoom.of(folder, rig, result)
     own = _own_names(patches, room)

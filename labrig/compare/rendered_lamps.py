@@ -21,8 +21,8 @@ from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import UsageError
 from labrig.foundation.plugins import measurement
 from labrig.foundation.result_warning import ResultWarning, Unmeasured
-from labrig.foundation.yaml_file import read_yaml
 from labrig.optics import CIE_1931, delta_e, lab, observer, white_xyz
+from labrig.record import plan_content
 from labrig.results import LampPatch, PredictedUnderLamps, read_result
 
 #: Light of a sample that is shown: as photographed, all that is rendered, and its two parts.
@@ -151,7 +151,7 @@ def is_of_fluorescence(folder: Path) -> bool:
     False
     """
     path = folder / "protocol.yaml"
-    protocol = read_yaml(path).get("protocol") if path.is_file() else None
+    protocol = plan_content(folder, path.name).get("protocol") if path.is_file() else None
     if not isinstance(protocol, str):
         return False
     registered = measurement(protocol, str(path))

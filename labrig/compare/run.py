@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import read_result_rig
 from labrig.bench_optics import calibration, camera_curves, with_shipped_camera
 from labrig.calibration import LVF_KIND
 from labrig.compare.glow import GlowComparison, compare_glow, glow_of, in_colour, predicted_by
@@ -26,10 +26,10 @@ from labrig.fit import DecayFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.result_warning import ResultWarning, Unmeasured
-from labrig.foundation.yaml_file import did_you_mean, read_yaml
+from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import Material, MaterialComparison, compare_materials, read_material
 from labrig.optics import CameraResponse
-from labrig.record import read_run
+from labrig.record import plan_content, read_run
 from labrig.results import (
     Series,
     find_fitted_decays,
@@ -83,7 +83,7 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
             f"{run}: expected a result with the fit of a decay, got none; make one: "
             f"labrig process {run}"
         )
-    protocol, result = read_yaml(run / "protocol.yaml"), run / "result"
+    protocol, result = plan_content(run, "protocol.yaml"), run / "result"
     sample, samples = protocol.get("sample"), _sample_names(protocol)
     only = sample.get("name") if isinstance(sample, dict) and len(folders) == 1 else None
     patches = []
@@ -287,7 +287,7 @@ def measured_camera(
     folder: Path, replacement: str | None
 ) -> tuple[CameraResponse | None, list[ResultWarning]]:
     """Return the curves requested, else those of the processing; without any, a warning."""
-    rig = with_shipped_camera(read_rig_file(folder / "rig.yaml"), read_run(folder).camera_identity)
+    rig = with_shipped_camera(read_result_rig(folder), read_run(folder).camera_identity)
     try:
         lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
         return camera_curves(rig, replacement, lvf), []

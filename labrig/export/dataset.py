@@ -152,9 +152,9 @@ def _variables(
     columns: dict[str, Column] = {}
     for name, value in values.items():
         if isinstance(value, Measured):
-            unit = {"units": value.unit}
-            columns[name] = ((), value.value, unit)
-            columns[name + SIGMA] = ((), value.sigma, unit)
+            in_unit = {"units": value.unit}
+            columns[name] = ((), value.value, in_unit)
+            columns[name + SIGMA] = ((), value.sigma, in_unit)
         elif (array := number_array(value)) is not None:
             arrays[name] = array
     lengths = coordinates_by_length(arrays)

@@ -50,7 +50,7 @@ MISSED = 0.05
 def fit_luminance(
     t_s: ArrayLike,
     luminance_mcd_per_m2: ArrayLike,
-    sigma_mcd_per_m2: ArrayLike | None = None,
+    luminance_mcd_per_m2_sigma: ArrayLike | None = None,
     *,
     scale_sigma: ArrayLike = 0.0,
     required: Sequence[LuminanceRequirement] = (),
@@ -66,7 +66,7 @@ def fit_luminance(
         Times of the readings after lamp off in seconds, rising, > 0, shape (n,).
     luminance_mcd_per_m2
         Luminances in mcd/m²; those in the noise may be negative, shape (n,).
-    sigma_mcd_per_m2
+    luminance_mcd_per_m2_sigma
         Standard uncertainty of each reading, shape (n,) or a scalar; None takes it from the
         scatter of neighbours.
     scale_sigma
@@ -100,14 +100,14 @@ def fit_luminance(
     >>> found.marking
     '21.5/3.27-532-K-W'
     """
-    readings = _Readings.checked(t_s, luminance_mcd_per_m2, sigma_mcd_per_m2, scale_sigma)
+    readings = _Readings.checked(t_s, luminance_mcd_per_m2, luminance_mcd_per_m2_sigma, scale_sigma)
     visible_s = readings.falls_below(VISIBLE_MCD_PER_M2)
     at = {t: readings.luminance_at(t) for t in TABLE_S}
     forecast, warnings = (None, ()) if visible_s else readings.forecast(VISIBLE_MCD_PER_M2)
     return LuminanceDecay(
         t_s=readings.t_s,
         luminance_mcd_per_m2=readings.value,
-        sigma_mcd_per_m2=np.full_like(readings.t_s, np.nan)
+        luminance_mcd_per_m2_sigma=np.full_like(readings.t_s, np.nan)
         if readings.sigma is None
         else readings.sigma,
         scale_sigma=float(readings.scale_sigma.max()),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.acquire import read_protocol
+from labrig.acquire import read_run_protocol
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import read_yaml
@@ -123,7 +123,7 @@ def read_reference(place: Path) -> Reference:
 
 def _region(folder: Path, patch: str) -> Region:
     """Return the region of a patch when it was processed, else that of the protocol."""
-    protocol = predictable(read_protocol(folder / "protocol.yaml"))
+    protocol = predictable(read_run_protocol(folder))
     processed = folder / "result" / "provenance.yaml"
     patches = read_yaml(processed)["regions"] if processed.is_file() else protocol.patches
     region: Region = patches.get(patch) or next(iter(patches.values()))

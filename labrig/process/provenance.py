@@ -3,18 +3,22 @@
 from collections import Counter
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Overrides, chosen_options, options_of
+from labrig.foundation.errors import UsageError
 from labrig.foundation.input_file import read_text
 from labrig.foundation.models import FrozenModel
 from labrig.foundation.region import Region
+from labrig.foundation.yaml_file import read_model
 from labrig.record import (
     DeviceLine,
     RunDescription,
     RunRecord,
     interruptions,
+    journal_text,
     read_notes,
     time_text,
 )
@@ -46,6 +50,9 @@ class Provenance(FrozenModel):
         Calibrations that the user named instead of the rig file's.
     journal
         Seal of the run's journal, the SHA-256 of its last line.
+    given
+        Options of `labrig process` that were given for this result, such as `--states 2`; those of
+        an earlier result are not kept.
     """
 
     labrig: str
@@ -57,6 +64,7 @@ class Provenance(FrozenModel):
     excluded: tuple[str, ...]
     optics: dict[str, str]
     journal: str
+    given: tuple[str, ...] = ()
 
 
 def provenance(
@@ -87,7 +95,16 @@ def provenance(
         excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),
         optics=dict(overrides.optics),
         journal=run.seal,
+        given=overrides.given(),
     )
+
+
+def given_before(run: Path) -> list[str]:
+    """Return the options that were given for the present result of a run; none without a result."""
+    try:
+        return list(read_model(run / "result" / PROVENANCE, Provenance).given)
+    except UsageError:
+        return []
 
 
 def _options(protocol: Any, overrides: Overrides) -> dict[str, Any]:
@@ -115,8 +132,19 @@ def library_versions() -> dict[str, str]:
     return {**installed, "opencv": cv2.__version__, "libraw": libraw}
 
 
-def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDescription:
-    """Collect the description of a run from its folder, its protocol and its rig."""
+def _text(run: RunRecord, name: str, *, edited: bool) -> str:
+    """Return the text of a run's file as its journal has it, or as it was edited since."""
+    text = None if edited else journal_text(run.folder, name)
+    return read_text(run.folder / name) if text is None else text
+
+
+def describe_run(
+    run: RunRecord, protocol: ProtocolModel, rig: RigFile, *, edited: bool = False
+) -> RunDescription:
+    """Collect the description of a run from its folder, its protocol and its rig.
+
+    `edited`: these are of the files as they were edited since.
+    """
     attempts = list(run.completed().values())
     start = attempts[0].start if attempts else run.attempts[0].start
     identities = start.get("devices", {})
@@ -137,8 +165,8 @@ def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDe
             for role, entry in rig.devices.items()
         ),
         guard=start.get("guard", ""),
-        protocol_text=read_text(run.folder / "protocol.yaml"),
-        rig_text=read_text(run.folder / "rig.yaml"),
+        protocol_text=_text(run, "protocol.yaml", edited=edited),
+        rig_text=_text(run, "rig.yaml", edited=edited),
         interruptions=interruptions(run),
         notes=read_notes(run.folder),
     )

@@ -158,6 +158,7 @@ def _settings(result: Path) -> dict[str, str]:
     try:
         content = read_yaml(result / PROVENANCE)
         content.pop("journal", None)  # of the run, not of its processing
+        content.pop("given", None)  # shows in the settings that were used
         content |= content.pop("options", None) or {}
         return dict(_flattened(content, ""))
     except UsageError:

@@ -3,10 +3,11 @@
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from labrig.acquire import ProtocolModel, RigFile
+from labrig.acquire import ProtocolModel, RigFile, result_takes_edits
 from labrig.analyse import (
     AnalysisContext,
     Inputs,
@@ -14,7 +15,6 @@ from labrig.analyse import (
     analyse_part,
     check_options,
     clock_warnings,
-    read_run_protocol,
     reference_of,
     require_recorded_settings,
     temperature_warnings,
@@ -23,9 +23,10 @@ from labrig.bench_optics import camera_curves, with_shipped_camera
 from labrig.calibration import LVF_KIND, LvfFile, keep_calibration, kept_calibrations
 from labrig.export import write_nexus
 from labrig.foundation.errors import DiskError, FitError, UsageError
-from labrig.foundation.output_file import make_folder_in
+from labrig.foundation.output_file import make_folder_in, write_durably
 from labrig.foundation.plugins import measurement
 from labrig.foundation.result_warning import (
+    Contradiction,
     ResultWarning,
     Unmeasured,
     warning_lines,
@@ -33,14 +34,22 @@ from labrig.foundation.result_warning import (
 from labrig.foundation.yaml_file import read_model, write_yaml
 from labrig.optics import CameraResponse
 from labrig.process.comparison import LOCK, include_comparison
-from labrig.process.provenance import PROVENANCE, Provenance, describe_run, provenance
+from labrig.process.provenance import (
+    PROVENANCE,
+    Provenance,
+    describe_run,
+    given_before,
+    provenance,
+)
 from labrig.process.result_changes import changes
 from labrig.process.verification import require_as_sealed
 from labrig.record import (
     PC_CLOCK,
+    FrameRecord,
     RunLock,
     RunRecord,
     clock_stepped,
+    edited_keys,
     read_run,
     require_plain_folder,
 )
@@ -51,13 +60,23 @@ from labrig.report import (
     calibration_sections,
     lamp_sections,
     render,
+    sample_picture,
     temperature_sections,
     write_figures_pdf,
     write_report,
 )
-from labrig.results import ChainResult, RunResult, read_result, write_result, write_summary
+from labrig.results import (
+    SAMPLE_PICTURE,
+    ChainResult,
+    RunResult,
+    read_result,
+    write_result,
+    write_summary,
+)
 
 _EARLIER = "result-"
+#: Exposure time in seconds below which a frame of a glow is mostly noise; for display only.
+BRIEF_S = 1 / 30
 
 
 def new_result(run: Path) -> Path:
@@ -170,12 +189,16 @@ class Processed:
         Most important numbers, in lines for the terminal.
     changes
         Differences from the result before; empty if there was none.
+    not_kept
+        Options that were given for the result before, and are not for this one, such as
+        `--states 2`: each processing starts from the protocol and the rig file.
     """
 
     result: RunResult
     report: Path
     lines: tuple[str, ...]
     changes: tuple[str, ...]
+    not_kept: tuple[str, ...] = ()
 
 
 def process_run(folder: Path | str, overrides: Overrides | None = None) -> RunResult:
@@ -251,7 +274,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     state  k / s⁻¹      1/k / s    amplitude / (DN/s)
     """
     folder, overrides = Path(folder), overrides or Overrides()
-    protocol = read_run_protocol(folder)
+    protocol = overrides.protocol(folder)
     with RunLock(folder / LOCK, "processing this run"):
         return _process(folder, overrides, protocol)
 
@@ -267,26 +290,30 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     require_recorded_settings(run, overrides.bench(folder), overrides)
     part, result, camera = _analysed(run, protocol, rig, overrides)
 
-    about = describe_run(run, protocol, rig)
+    about = describe_run(run, protocol, rig, edited=overrides.edited)
     result_folder = new_result(folder)
     write_provenance(
         result_folder, provenance(run, protocol, overrides, camera.name if camera else None)
     )
     write_result(result_folder, result)
     write_nexus(result_folder / "run.nxs", run, about, result)
+    shown = [sorted(run.frames(role), key=_dimness) for role in protocol.picture_frames]
+    if (picture := sample_picture([*chain.from_iterable(shown)], camera)) is not None:
+        write_durably(result_folder / SAMPLE_PICTURE, picture)
     rendered = _render(result, Source(run, protocol, rig, about, camera))
     warning_texts = warning_lines(result.warnings, "warning: ")
     write_summary(result_folder, [*rendered.lines, *warning_texts])
     report = Report(about, result.warnings, rendered.sections, rendered.methods, frames, camera)
     write_report(result_folder / "report.html", report)
     include_comparison(folder, result_folder)
+    not_kept = tuple(overrides.not_kept(given_before(folder)))
     changes = put_in_place(result_folder)
     keep_calibration(folder, None if result.failures() else reference_of(part, result))
 
     page = folder / "result" / "report.html"
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
-    return Processed(result.of_run(folder), page, rendered.lines, changes)
+    return Processed(result.of_run(folder), page, rendered.lines, changes, not_kept)
 
 
 def _analysed(
@@ -306,6 +333,7 @@ def _analysed(
         *temperature_warnings(run, protocol.rate_frames),
         *_clock_step_warnings(run),
         *_unfinished_warnings(run, protocol),
+        *_edited_warnings(run.folder, overrides),
     )
     return part, replace(result, warnings=warnings), camera
 
@@ -343,9 +371,15 @@ def refit(result: RunResult, options: Mapping[str, Any]) -> RunResult:
     """
     folder = _folder_of(result)
     made = read_model(folder / "result" / PROVENANCE, Provenance)
-    protocol = read_run_protocol(folder)
-    regions = made.regions if hasattr(protocol, "patches") else {}
-    overrides = Overrides(regions, frozenset(made.excluded), optics=made.optics, options=options)
+    edited = result_takes_edits(folder)
+    protocol = Overrides(edited=edited).protocol(folder)
+    overrides = Overrides(
+        regions=made.regions if hasattr(protocol, "patches") else {},
+        excluded=frozenset(made.excluded),
+        optics=made.optics,
+        options=options,
+        edited=edited,
+    )
     check_options(options, protocol)
     with RunLock(folder / LOCK, "processing this run"):
         run = read_run(folder)
@@ -397,14 +431,22 @@ def rendered_result(result: RunResult) -> Rendered:
     ['Results', 'Sample']
     """
     folder = _folder_of(result)
-    run, protocol = read_run(folder), read_run_protocol(folder)
-    rig = with_shipped_camera(Overrides().bench(folder), run.camera_identity)
+    overrides = Overrides(edited=result_takes_edits(folder))
+    run, protocol = read_run(folder), overrides.protocol(folder)
+    rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
     camera, _ = _camera_response(rig, None, Inputs.of(rig).updated_by(result)[LVF_KIND])
-    source = Source(run, protocol, rig, describe_run(run, protocol, rig), camera)
+    about = describe_run(run, protocol, rig, edited=overrides.edited)
+    source = Source(run, protocol, rig, about, camera)
     if not result.run_part:
         return _render(result, source)
-    link = next(link for link in protocol.chain() if link.name == result.run_part)
+    chain: Any = protocol
+    link = next(link for link in chain.chain() if link.name == result.run_part)
     return render(result, replace(source, run=run.part(link.name), protocol=link.protocol))
+
+
+def _dimness(frame: FrameRecord) -> tuple[bool, float]:
+    """Return a rank: metered frames are the shorter, the brighter it is; brief ones are noisy."""
+    return frame.exposure_s < BRIEF_S, frame.exposure_s * frame.iso
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:
@@ -443,7 +485,8 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     folder = Path(folder)
     result, run = read_result(folder), read_run(folder)
     path = path or folder / "result" / "figures" / "figures.pdf"
-    title = f"{read_run_protocol(folder).sample.name}, {run.name}"
+    protocol = Overrides(edited=result_takes_edits(folder)).protocol(folder)
+    title = f"{protocol.sample.name}, {run.name}"
     n_pages = write_figures_pdf(path, title, rendered_result(result).sections)
     if not n_pages:
         raise UsageError(f"{folder}: expected a report with figures, it has none")
@@ -479,6 +522,19 @@ def _unfinished_warnings(run: RunRecord, protocol: ProtocolModel) -> tuple[Resul
             units=len(units),
             first=missing[0],
             run=run.name,
+        ),
+    )
+
+
+def _edited_warnings(folder: Path, overrides: Overrides) -> tuple[ResultWarning, ...]:
+    """Return a warning of edits of the run's files that were taken instead of its journal."""
+    if not overrides.edited or not (edits := edited_keys(folder)):
+        return ()
+    return (
+        Contradiction(
+            "run-edited",
+            "processed by files that were edited since the run was recorded: {edits}",
+            edits="; ".join(edits),
         ),
     )
 

@@ -5,10 +5,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import read_run_protocol, read_run_rig
 from labrig.analyse import (
     clock_warnings,
-    read_run_protocol,
     settings_differences,
     spectra_differences,
 )
@@ -22,6 +21,7 @@ from labrig.record import (
     RunLock,
     RunRecord,
     damaged_frames,
+    edited_keys,
     line_seals,
     read_run,
 )
@@ -269,11 +269,11 @@ def _differences(run: RunRecord) -> Iterator[str]:
     frames = [frame for attempt in run.attempts for frame in attempt.frames]
     spectra = [spectrum for attempt in run.attempts for spectrum in attempt.spectra]
     try:
-        rig = read_rig_file(run.folder / "rig.yaml")
-        protocol = read_run_protocol(run.folder)
+        rig, protocol = read_run_rig(run.folder), read_run_protocol(run.folder)
     except UsageError as error:
         yield str(error)
         return
+    yield from (f"{run.folder}: {line}" for line in edited_keys(run.folder))
     asked = {"protocol": protocol.protocol, "sample": protocol.sample.name, "rig": rig.name}
     for key, value in asked.items():
         if others := {attempt.start.get(key, value) for attempt in run.attempts} - {value}:

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from labrig.acquire import read_protocol
+from labrig.acquire import read_run_protocol
 from labrig.catalogue import RunSummary, summarise
 from labrig.fit import fit_power_law
 from labrig.foundation.errors import FitError, LabrigError
@@ -160,7 +160,7 @@ class QueueEntry:
         if self.summary is None:
             return np.nan
         try:
-            value: Any = read_protocol(self.summary.folder / "protocol.yaml")
+            value: Any = read_run_protocol(self.summary.folder)
         except LabrigError:
             return np.nan
         for name in key.split("."):

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from filelock import Timeout
 
-from labrig.acquire import SAMPLE_CHANGER, RigFile, driver_and_settings, read_rig_file
+from labrig.acquire import SAMPLE_CHANGER, RigFile, driver_and_settings, read_run_rig
 from labrig.bench import Recording, Watch, resume_run
 from labrig.catalogue import summarise
 from labrig.foundation.activity import activity
@@ -119,7 +119,7 @@ def _recorded(path: Path, runs: Path, entry: QueueEntry, before: str, attendant:
         )
     folder = entry.summary.folder
     if summarise(folder).status != "recorded":
-        resume_run(folder, attendant.watch(read_rig_file(folder / "rig.yaml")))
+        resume_run(folder, attendant.watch(read_run_rig(folder)))
     return folder
 
 

@@ -48,12 +48,19 @@ from .journal import (
 from .plain_folder import (
     require_plain_folder as require_plain_folder,
 )
+from .plan_files import (
+    PLAN_FILES as PLAN_FILES,
+    edited_keys as edited_keys,
+    journal_text as journal_text,
+    plan_content as plan_content,
+)
 from .run_folder import (
     CALIBRATIONS_FILE as CALIBRATIONS_FILE,
     RECORDING_LOCK as RECORDING_LOCK,
     RunFolder as RunFolder,
     RunLock as RunLock,
     RunSize as RunSize,
+    lost_files as lost_files,
     size_text as size_text,
     time_made as time_made,
 )

@@ -193,7 +193,10 @@ def read_journal(path: Path) -> JournalContent:
     False
     """
     if not path.is_file():
-        raise DataError(f"{path}: there is no journal")
+        raise DataError(
+            f"{path}: there is no journal; restore it from a copy, or record the run: labrig "
+            f"resume {path.parent}"
+        )
     return _parse(path, read_bytes(path, MAX_JOURNAL_BYTES))
 
 
@@ -242,13 +245,13 @@ def _parse(path: Path, raw: bytes) -> JournalContent:
         except (ValueError, KeyError, TypeError, RecursionError):
             raise DataError(
                 f"{path}, line {number}: expected a journal document, got {line[:40]!r}; "
-                "the file was changed after the run"
+                "the file was changed after the run; restore it from a copy"
             ) from None
         if after != seal:
             before = "the beginning" if number == 1 else f"line {number - 1}"
             raise DataError(
                 f"{path}, line {number}: does not follow {before} as it was written: the file was "
-                "changed after the run"
+                "changed after the run; restore it from a copy"
             )
         seal = _seal(line)
     return JournalContent(documents, torn, seal)
@@ -391,9 +394,9 @@ def check_start(doc: Mapping[str, Any]) -> None:
     texts = [doc[key] for key in _TEXTS if key in doc]
     if not isinstance(devices, dict):
         raise TypeError("'devices' is of another kind")
-    texts += [doc["uid"], doc["unit"], *devices.values()]
+    texts += [doc["uid"], doc["unit"], *devices.values(), *dict(doc.get("files", {})).values()]
     if not all(isinstance(text, str) for text in texts):
-        raise TypeError("'unit', 'devices' or another text is of another kind")
+        raise TypeError("'unit', 'devices', 'files' or another text is of another kind")
     if not all(isinstance(doc[key], bool) for key in doc if key.endswith(_READS_BACK)):
         raise TypeError("whether a light reads back is of another kind")
 

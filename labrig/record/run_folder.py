@@ -7,7 +7,7 @@ import shutil
 import socket
 import sys
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
@@ -34,7 +34,8 @@ from labrig.foundation.readable_output import spelled
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, Journal
 from labrig.record.plain_folder import require_plain_folder
-from labrig.record.run_record import RunRecord, run_record
+from labrig.record.plan_files import FILES, files_bytes, plan_texts
+from labrig.record.run_record import Attempt, RunRecord, run_record
 
 MADE = "made.txt"
 
@@ -199,6 +200,12 @@ class RunFolder:
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)
         self._executor = ThreadPoolExecutor(1)
+        self._files_due = False
+        self._files_bytes = sum(
+            files_bytes(doc[FILES])
+            for _, doc in (self._journal.read().documents if seed is not None else [])
+            if FILES in doc
+        )
 
     @classmethod
     def create(
@@ -267,20 +274,7 @@ class RunFolder:
 
     def unknown_files(self) -> list[str]:
         """Return the names of files among the frames that have no journal line, left by a crash."""
-        recorded = {file.path.name for attempt in self.read().attempts for file in attempt.files}
-        return sorted(
-            path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
-        )
-
-    def lost_files(self) -> list[str]:
-        """Return the names of files after the last in the journal, whose lines were lost.
-
-        A crash leaves one at most, which it kept from its line; several had lines.
-        """
-        recorded = [file.path.name for attempt in self.read().attempts for file in attempt.files]
-        last = max(recorded, default="")
-        later = [name for name in self.unknown_files() if name > last and not name.endswith(PART)]
-        return later if len(later) > 1 else []
+        return _unknown_files(self.path, self.read().attempts)
 
     def attempt(
         self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]
@@ -294,19 +288,29 @@ class RunFolder:
         wall
             Function that gives the time in seconds since 1970.
         metadata
-            Keys and values of the RunStart.
+            Keys and values of the RunStart; the first one has the run's files, too.
         """
-        return AttemptWriter(
+        texts = {}
+        if self._files_due or self._journal.size_bytes == 0:
+            texts = {FILES: plan_texts(self.path)}
+        writer = AttemptWriter(
             self._journal,
             unit,
             self.path / "frames",
             self._next_frame_number,
             wall,
             self._new_uid,
-            metadata,
+            {**metadata, **texts},
             self._disk,
             self._executor,
         )
+        self._files_due = False
+        self._files_bytes += sum(map(files_bytes, texts.values()))
+        return writer
+
+    def take_edits(self) -> None:
+        """Write the files as they are now into the next RunStart, from which they hold."""
+        self._files_due = True
 
     def close_open_attempts(
         self, wall: Callable[[], float], exit_status: str, reason: str
@@ -367,7 +371,8 @@ class RunFolder:
     def _new_uid(self) -> str:
         if self._seed is None:
             return str(uuid.uuid4())
-        place = self._journal.size_bytes
+        # Without the files, in which are paths of this PC: the same run has the same uids.
+        place = self._journal.size_bytes - self._files_bytes
         return str(uuid.uuid5(uuid.NAMESPACE_OID, f"labrig {self._seed} {place}"))
 
     def _next_frame_number(self) -> int:
@@ -413,6 +418,43 @@ def _slug(name: str) -> str:
     text = spelled(name, sys.getfilesystemencoding())
     slug = re.sub(r"[^\w.-]+", "-", text).strip("-.")
     return os.fsencode(slug)[:80].decode(sys.getfilesystemencoding(), "ignore") or "run"
+
+
+def _unknown_files(run: Path, attempts: Sequence[Attempt]) -> list[str]:
+    recorded = {file.path.name for attempt in attempts for file in attempt.files}
+    return sorted(path.name for path in (run / "frames").glob("*") if path.name not in recorded)
+
+
+def lost_files(run: Path, attempts: Sequence[Attempt]) -> list[str]:
+    """Return the names of files after the last in the journal, whose lines were lost.
+
+    A crash leaves one at most, which it kept from its line; several had lines.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+    attempts
+        Attempts of which the journal still has lines.
+
+    Returns
+    -------
+    list of str
+        Names of files in the folder of the frames; none if nothing was lost.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import lost_files
+    >>> run = labrig.read_run("runs/decay")
+    >>> lost_files(run.folder, run.attempts), len(lost_files(run.folder, run.attempts[:1]))
+    ([], 25)
+    """
+    last = max((file.path.name for attempt in attempts for file in attempt.files), default="")
+    later = [
+        name for name in _unknown_files(run, attempts) if name > last and not name.endswith(PART)
+    ]
+    return later if len(later) > 1 else []
 
 
 def _highest_frame(frames: Path) -> int:

@@ -275,7 +275,8 @@ def run_record(folder: Path, content: JournalContent) -> RunRecord:
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(
                 f"{folder / JOURNAL}, line {number}: a '{name}' document that does not fit "
-                f"({_error_text(error)}); the file was changed after the run"
+                f"({_error_text(error)}); the file was changed after the run; restore it from a "
+                "copy"
             ) from None
     return RunRecord(folder, list(attempts.values()), content.torn, last_time, content.seal)
 

@@ -55,6 +55,7 @@ from .pictures import (
     binned as binned,
     is_grey as is_grey,
     jpeg as jpeg,
+    png as png,
     small as small,
 )
 from .raw import (

@@ -1,6 +1,6 @@
 """RAW frames binned to small pictures."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -133,9 +133,43 @@ def jpeg(rgb: NDArray[np.uint8]) -> bytes:
     """
     import cv2
 
-    good, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return _encoded(rgb, ".jpg", [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+
+
+def png(rgb: NDArray[np.uint8]) -> bytes:
+    """Encode a picture as PNG.
+
+    Parameters
+    ----------
+    rgb
+        Picture with 8 bits a channel, shape (height, width, 3).
+
+    Returns
+    -------
+    bytes
+        The content of a PNG file.
+
+    Raises
+    ------
+    RuntimeError
+        OpenCV cannot encode the picture.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reduce import png
+    >>> png(np.zeros((2, 3, 3), np.uint8))[1:4]
+    b'PNG'
+    """
+    return _encoded(rgb, ".png", [])
+
+
+def _encoded(rgb: NDArray[np.uint8], suffix: str, settings: Sequence[int]) -> bytes:
+    import cv2
+
+    good, data = cv2.imencode(suffix, rgb[..., ::-1], settings)
     if not good:
-        raise RuntimeError("OpenCV could not encode a JPEG")
+        raise RuntimeError(f"OpenCV could not encode a picture as {suffix}")
     return data.tobytes()
 
 

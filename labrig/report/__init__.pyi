@@ -73,6 +73,9 @@ from .page import (
     write_report as write_report,
 )
 from .phosphor_picture import draw_phosphor as draw_phosphor
+from .photographs import (
+    sample_picture as sample_picture,
+)
 from .renderers import (
     render as render,
 )

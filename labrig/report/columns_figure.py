@@ -52,21 +52,26 @@ def columns_pictures(result: Any) -> Iterator[Picture]:
     >>> [picture.name for picture in columns_pictures(depth)]
     ['rate_per_s']
     """
-    groups: dict[str, list[Quantity]] = {}
-    for quantity in iter_quantities(result):
-        if quantity.path:
-            groups.setdefault(quantity.path[-1], []).append(quantity)
-    for name, group in sorted(groups.items(), key=lambda item: item[1][0].sigma is None):
-        fewest = MIN_ROWS if group[0].sigma is None else 2
-        if fewest <= len(group) <= MAX_ROWS:
-            yield Picture(name, partial(_rows_figure, group))
     items = list(iter_values(result))
     units = Units(items)
     nodes: dict[Place, dict[str, NDArray[Any]]] = {}
     for path, value in items:
         if path and (array := number_array(value)) is not None and array.ndim == 1:
             nodes.setdefault(path[:-1], {})[path[-1]] = array
-    for inner, arrays in nodes.items():
+    own = nodes.pop((), {})
+    # Curves of the result itself come first.
+    is_curve = any(own[name].dtype.kind != "U" for name in coordinates_by_length(own).values())
+    if is_curve:
+        yield from _columns((), own, units)
+    groups: dict[str, list[Quantity]] = {}
+    for quantity in iter_quantities(result):
+        if quantity.path and quantity.path[-1] != "sigma":
+            groups.setdefault(quantity.path[-1], []).append(quantity)
+    for name, group in sorted(groups.items(), key=lambda item: item[1][0].sigma is None):
+        fewest = MIN_ROWS if group[0].sigma is None else 2
+        if fewest <= len(group) <= MAX_ROWS:
+            yield Picture(name, partial(_rows_figure, group))
+    for inner, arrays in (*nodes.items(), *(() if is_curve else [((), own)])):
         yield from _columns(inner, arrays, units)
 
 

@@ -11,7 +11,7 @@ from labrig.fit import ChargeFit, MixtureFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import plus_minus, rounded
 from labrig.foundation.plugins import measurement
-from labrig.material import Material, MaterialComparison
+from labrig.material import Material, MaterialComparison, ReradiationMatrix
 from labrig.record import RunDescription, RunRecord, time_text
 from labrig.report.charge import charge_report
 from labrig.report.chart import Chart, Line, Panel, logarithmic_axis
@@ -29,12 +29,14 @@ from labrig.report.parameters import (
     state_rows,
 )
 from labrig.report.phosphor_picture import bands_figure, has_bands
+from labrig.report.reradiation import describe_reradiation, reradiation_figure
 from labrig.report.run_sections import calibration_sections, temperature_sections
 from labrig.report.sections import Picture, Section, Table
 from labrig.report.trap_depth import trap_depth_report
 from labrig.results import (
     DecayPatch,
     FittedDecay,
+    FluorescentPatch,
     Quantity,
     ResultWithDecays,
     Series,
@@ -215,6 +217,19 @@ def _(fit: ChargeFit) -> tuple[Section, ...]:
 def _(fit: MixtureFit) -> tuple[Section, ...]:
     table = Table(component_head(fit), tuple(component_rows(fit)))
     return (Section("Mixture", (components_text(fit),), tables=(table,)),)
+
+
+@sections_of.register
+def _(matrix: ReradiationMatrix) -> tuple[Section, ...]:
+    figure = Picture("matrix", partial(reradiation_figure, matrix, ()))
+    points = tuple(line.strip() for line in describe_reradiation(matrix, ()).splitlines()[1:])
+    return (Section("Re-radiation", figures=(figure,), points=points),)
+
+
+@sections_of.register
+def _(patch: FluorescentPatch) -> tuple[Section, ...]:
+    values = Section("Values", tables=tuple(_values(patch)))
+    return (*sections_of(patch.matrix.named("")), values)
 
 
 @sections_of.register

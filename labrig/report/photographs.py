@@ -11,23 +11,27 @@ from numpy.typing import NDArray
 from labrig.foundation.errors import LabrigError, UsageError
 from labrig.foundation.number_format import exposure_text, rounded
 from labrig.foundation.region import region_pixels
-from labrig.optics import srgb_bytes
-from labrig.record import FrameRecord
+from labrig.optics import CameraResponse, srgb_bytes
+from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import (
     MakeThumbnail,
     Reduction,
     SaturatedFraction,
     Thumbnail,
     jpeg,
+    png,
     reduce_frames,
+    small,
 )
-from labrig.report.colours import Screen, into_gamut
+from labrig.report.colours import Screen, into_gamut, screen_for
 from labrig.report.report_model import GlowPhotograph, PatchReport
 
 Reduced = TypeVar("Reduced")
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
+#: Width in pixels of the picture of a sample in a list of runs.
+SAMPLE_WIDTH = 120
 #: Largest fraction of saturated pixels in a well exposed daylight photograph; for display only.
 CLIPPED_FRACTION = 0.002
 #: Quantile of the pixels that is shown at full brightness, so that hot pixels have no influence.
@@ -132,6 +136,42 @@ def sensor_of(frames: Sequence[FrameRecord]) -> Sensor | None:
         if view is not None:
             make = view.make if view.make and view.make not in (view.model or "") else None
             return Sensor(" ".join(filter(None, (make, view.model))), view.width, view.height)
+    return None
+
+
+def sample_picture(frames: Sequence[FrameRecord], camera: CameraResponse | None) -> bytes | None:
+    """Return a small picture of the sample as the content of a PNG file.
+
+    Parameters
+    ----------
+    frames
+        Frames that show the sample, the best first; the first one that can be read is shown, as
+        bright as a screen can.
+    camera
+        Curves of the camera; None for raw colours.
+
+    Returns
+    -------
+    bytes or None
+        Picture of 120 pixels in width at most; None if no frame can be read.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import sample_picture
+    >>> picture = sample_picture(labrig.read_run("runs/decay").frames("decay"), None)
+    >>> picture[1:4]
+    b'PNG'
+    """
+    screen = screen_for(camera)
+    for frame in frames:
+        if (view := _reduced(frame, MakeThumbnail(GLOW_WIDTH))) is None:
+            continue
+        matrix = screen.lamp_lit if frame.role == FrameRole.DAYLIGHT else screen.glow
+        linear = into_gamut(_to_screen(view, view.rgb.astype(np.float64), matrix))
+        level = max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
+        shown = np.where(view.is_saturated[..., np.newaxis], 1.0, np.minimum(linear / level, 1.0))
+        return png(srgb_bytes(small(shown.astype(np.float32), SAMPLE_WIDTH).astype(np.float64)))
     return None
 
 

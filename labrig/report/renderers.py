@@ -68,7 +68,7 @@ def render(result: RunResult, source: Source) -> Rendered:
     --------
     >>> from pathlib import Path
     >>> import labrig
-    >>> from labrig.analyse import read_run_protocol
+    >>> from labrig.acquire import read_run_protocol
     >>> from labrig.record import RunDescription
     >>> from labrig.report import Source, render
     >>> run = labrig.read_run(Path("runs/decay"))

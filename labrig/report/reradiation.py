@@ -224,14 +224,14 @@ def draw_reradiation(matrix: ReradiationMatrix, lights: Sequence[Spectrum], path
     """
     require_picture(path)
     with figure_style():
-        figure = _figure(matrix, lights)
+        figure = reradiation_figure(matrix, lights)
         save_picture(figure, path)
 
 
-def _figure(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) -> "Figure":
-    from matplotlib.figure import Figure
+def reradiation_figure(matrix: ReradiationMatrix, lights: Sequence[Spectrum]) -> "Figure":
+    from labrig.report.notebook_figure import NotebookFigure  # matplotlib is slow to load
 
-    figure = Figure(figsize=(9.0, 6.2 if lights else 5.2), layout="constrained")
+    figure = NotebookFigure(figsize=(9.0, 6.2 if lights else 5.2), layout="constrained")
     figure.suptitle(matrix.name, color=INK)
     heights = [1.0, 1.0, 0.4] if lights else [1.0, 1.0]
     rows = figure.add_gridspec(len(heights), 2, height_ratios=heights)

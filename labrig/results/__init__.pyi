@@ -94,6 +94,9 @@ from .fluorescent_patch import (
     ReradiatedSpectrum as ReradiatedSpectrum,
     ReradiationUnderLight as ReradiationUnderLight,
 )
+from .headline_values import (
+    headline_values as headline_values,
+)
 from .interval import (
     ASYMMETRIC as ASYMMETRIC,
     NORMAL_95 as NORMAL_95,
@@ -162,6 +165,7 @@ from .strip_profile import (
     StripProfile as StripProfile,
 )
 from .summary import (
+    SAMPLE_PICTURE as SAMPLE_PICTURE,
     SUMMARY as SUMMARY,
     read_summary as read_summary,
     write_summary as write_summary,

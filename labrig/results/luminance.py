@@ -208,7 +208,7 @@ class LuminanceDecay(NotebookViews):
 
     Attributes
     ----------
-    t_s, luminance_mcd_per_m2, sigma_mcd_per_m2
+    t_s, luminance_mcd_per_m2, luminance_mcd_per_m2_sigma
         Readings: time after lamp off in seconds, luminance and its σ, NaN where not given, (n,).
     scale_sigma
         Relative σ that is common to all readings, the largest of them if it changes, as at the
@@ -238,7 +238,7 @@ class LuminanceDecay(NotebookViews):
 
     t_s: FloatArray
     luminance_mcd_per_m2: FloatArray
-    sigma_mcd_per_m2: FloatArray
+    luminance_mcd_per_m2_sigma: FloatArray
     scale_sigma: float
     at: tuple[LuminanceAt, ...]
     required: tuple[tuple[LuminanceRequirement, LuminanceAt], ...]

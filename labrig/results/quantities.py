@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,8 +58,8 @@ class Units:
             return unit
         if path[-1].startswith(IN_VALUES):
             for length in range(len(path) - 1, -1, -1):
-                if (unit := self._of_values.get(path[:length])) is not None:
-                    return str(unit)
+                if path[:length] in self._of_values:
+                    return str(self._of_values[path[:length]])
         return ""
 
 
@@ -100,7 +100,7 @@ def iter_quantities(result: Any) -> Iterator[Quantity]:
             )
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

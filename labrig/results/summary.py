@@ -8,6 +8,8 @@ from labrig.foundation.input_file import read_text
 from labrig.foundation.output_file import write_text
 
 SUMMARY = "summary.txt"
+#: Small picture of the sample in a result folder, where a frame shows it.
+SAMPLE_PICTURE = "sample.png"
 
 
 def write_summary(folder: Path, lines: Sequence[str]) -> None:

@@ -106,10 +106,10 @@ class Previews:
 def answer(run: Path, width: int, requests: Iterable[str], out: TextIO) -> None:
     """Print the previews requested, one JSON line each; unreadable frames are left out."""
     # only in the process that looks: the one that runs the rig starts without what this loads
-    from labrig.acquire import read_protocol
+    from labrig.acquire import read_run_protocol
     from labrig.watch.preview import glance
 
-    protocol = read_protocol(run / "protocol.yaml")
+    protocol = read_run_protocol(run)
     for request in requests:
         name, unit = json.loads(request)
         try:

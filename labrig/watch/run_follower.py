@@ -16,12 +16,12 @@ from labrig.acquire import (
     PlanClock,
     ProtocolModel,
     plan,
-    read_protocol,
-    read_rig_file,
+    read_run_protocol,
+    read_run_rig,
     step_text,
 )
 from labrig.catalogue import RunStatus, status_of
-from labrig.foundation.errors import DataError, LabrigError, UsageError
+from labrig.foundation.errors import DataError, LabrigError
 from labrig.foundation.region import Region
 from labrig.record import UNDONE, ActionRecord, Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
@@ -152,12 +152,10 @@ class RunFollower:
     """
 
     def __init__(self, run: Path) -> None:
-        if not (run / "protocol.yaml").is_file():
-            raise UsageError(f"{run}: expected a run folder with protocol.yaml in it; see --runs")
         self.run = run
         self.picture: bytes | None = None
-        self._protocol: ProtocolModel = read_protocol(run / "protocol.yaml")
-        rig = read_rig_file(run / "rig.yaml")
+        self._protocol: ProtocolModel = read_run_protocol(run)
+        rig = read_run_rig(run)
         self._is_simulated = rig.simulation is not None
         self._rig = rig
         self._plan = plan(self._protocol, rig, str(run / "rig.yaml"))

@@ -5,7 +5,7 @@ horizontal yarn; and one view of a sphere, which shows all angles of incidence a
 """
 
 import random
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Literal, Self
@@ -226,6 +226,11 @@ class AngularFluorescence(ProtocolModel):
             order.shuffle(angles)
             views += [(str(turn), angle) for angle in angles]
         return [*views, ("after", self.angles[0])]
+
+    @property
+    def picture_frames(self) -> Collection[str]:
+        """Role of the frames that show the sample under the LED."""
+        return (AngularFrames.VIEW,)
 
     def units(self) -> Sequence[Unit]:
         """Return metering under each LED, then all views, then the bench put back."""

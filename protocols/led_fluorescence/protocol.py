@@ -4,7 +4,7 @@ After the thesis of which chapters 3 and 4 describe the set-up (nine LEDs at 45Â
 the part of the light that comes back at other wavelengths than those of the LED is re-radiated.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import StrEnum
 from typing import Literal, Self
 
@@ -71,6 +71,11 @@ class LedFluorescence(LedSettings):
                 f"expected LEDs and lamps of different names, got '{min(shared)}' twice"
             )
         return self
+
+    @property
+    def picture_frames(self) -> Collection[str]:
+        """Role of the frames that show the sample under an LED."""
+        return (LedFrames.SAMPLE,)
 
     def units(self) -> Sequence[Unit]:
         """Return darks, card and samples under every LED and lamp, the first LED once more."""

@@ -209,7 +209,7 @@ def _figure(patches: Mapping[str, PatchLuminance]) -> Figure:
         t_s, light = decay.t_s[drawn], decay.luminance_mcd_per_m2[drawn]
         if not len(t_s):
             continue
-        error_bars(axes, t_s, light, decay.sigma_mcd_per_m2[drawn], colour)
+        error_bars(axes, t_s, light, decay.luminance_mcd_per_m2_sigma[drawn], colour)
         points(axes, t_s, light, marker, colour, colour, size=2.4)
         entries.append(marker_entry(name, marker, colour))
         lowest, highest = min(lowest, float(light.min())), max(highest, float(light.max()))

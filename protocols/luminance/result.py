@@ -118,7 +118,8 @@ class PatchLuminance:
 
     def csv_tables(self) -> dict[str, CsvTable]:
         """Return the readings as `luminance.csv`."""
-        columns = (self.decay.t_s, self.decay.luminance_mcd_per_m2, self.decay.sigma_mcd_per_m2)
+        decay = self.decay
+        columns = (decay.t_s, decay.luminance_mcd_per_m2, decay.luminance_mcd_per_m2_sigma)
         rows = (tuple(f"{number:.8g}" for number in row) for row in zip(*columns, strict=True))
         return {"luminance.csv": CsvTable(HEAD, rows)}
 

@@ -6,7 +6,7 @@ Appearance, eq. 2). Below the filter a place is lit by narrow light, through it 
 wavelength is seen; the glow alone is photographed when the lamp is off.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal
@@ -93,6 +93,11 @@ class Reflectance(ConfiguredProtocol):
     def bracketing(self) -> Bracketing:
         """Bracketing with which card and sample are photographed."""
         return Bracketing(self.camera, self.longest, self.repeats)
+
+    @property
+    def picture_frames(self) -> Collection[str]:
+        """Role of the frames that show the sample in white light."""
+        return (ReflectanceFrames.SAMPLE_WHITE,)
 
     def configured_units(self) -> Sequence[ConfiguredUnit]:
         """Return darks, then the sample between two cards: by white light, by narrow light."""

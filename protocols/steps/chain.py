@@ -19,7 +19,7 @@ from labrig.foundation.errors import ProtocolError
 from labrig.foundation.plugins import Measurement, measurement
 from labrig.foundation.region import Region
 from labrig.foundation.yaml_file import validate
-from labrig.record import unit_in, unit_within
+from labrig.record import FrameRole, unit_in, unit_within
 
 from .bench_configuration import BenchConfiguration, ConfiguredProtocol, ConfiguredUnit
 
@@ -65,6 +65,12 @@ class Chain(ProtocolModel):
     def rate_frames(self) -> Collection[str]:
         """Roles of the frames to which rates are fitted in any part."""
         return tuple({role: None for part in self._links() for role in part.protocol.rate_frames})
+
+    @property
+    def picture_frames(self) -> Collection[str]:
+        """Roles of the frames that show the sample in any part, its decay first."""
+        roles = {role: None for part in self._links() for role in part.protocol.picture_frames}
+        return sorted(roles, key=lambda role: role != FrameRole.DECAY)
 
     def patches_of(self, unit: str) -> Mapping[str, Region]:
         """Return the patches of the part to which the unit belongs."""

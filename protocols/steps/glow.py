@@ -1,7 +1,7 @@
 """Protocols that charge a sample and photograph its glow: keys, rest before, darks, metering."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated
@@ -138,6 +138,11 @@ class GlowSettings(MeteredChargeSettings):
     @abstractmethod
     def role(self) -> str:
         """Role of the frames of the glow."""
+
+    @property
+    def picture_frames(self) -> Collection[str]:
+        """Role of the frames that show the sample: its glow."""
+        return (self.role,)
 
     @abstractmethod
     def times_s(self) -> Sequence[float]:

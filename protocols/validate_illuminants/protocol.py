@@ -4,7 +4,7 @@ After chapter 5 of the thesis that `led_fluorescence` follows: its figure 5.3 ha
 predictions side by side, white balanced by a colour checker under one of the lamps.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import StrEnum
 from typing import Annotated, Literal, Self
 
@@ -106,6 +106,11 @@ class ValidateIlluminants(ProtocolModel):
     def bracketing(self) -> Bracketing:
         """Bracketing of every scene."""
         return Bracketing(self.camera, self.longest, self.repeats, self.exposures)
+
+    @property
+    def picture_frames(self) -> Collection[str]:
+        """Role of the frames that show the sample under a lamp."""
+        return (IlluminantFrames.SAMPLE,)
 
     def units(self) -> Sequence[Unit]:
         """Return darks, the card under every lamp, the chart under one, the samples under all."""

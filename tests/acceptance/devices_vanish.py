@@ -110,7 +110,7 @@ def trial(
         lamp = "on" if ended.bench.get("lamp_on") else "off"
         rig["simulation"]["initial"] = rig["simulation"].get("initial", {}) | {"lamp": lamp}
         (run / "rig.yaml").write_text(yaml_text(rig), encoding="utf-8")
-        again = forked_labrig(folder, ["resume", run, "--yes", "--no-process"])
+        again = forked_labrig(folder, ["resume", run, "--yes", "--no-process", "--edited"])
     else:
         again = forked_labrig(folder, _run(case, folder))
         (run,) = (folder / "runs").iterdir()

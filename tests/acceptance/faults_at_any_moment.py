@@ -172,7 +172,7 @@ def _try(rng: random.Random, fault: str, scene: Scene, folder: Path, tally: Tall
             "initial": {"lamp": "on" if ending.lamp_on else "off"},
         }
         (run / "rig.yaml").write_text(yaml.safe_dump(rig | {"simulation": simulation}))
-        ending = _child(["resume", run], folder)
+        ending = _child(["resume", run, "--edited"], folder)
         tally.resumes += 1
         _judge(ending, faults if left else [], None, require)
         require(kept.items() <= _completed(run).items(), "a complete unit was not kept")

@@ -176,7 +176,7 @@ class ExerciseContext:
 
     def _arguments(self) -> list[object]:
         run = self._recorded
-        return _run(self.case, self.folder) if run is None else ["resume", run, "--yes"]
+        return _run(self.case, self.folder) if run is None else ["resume", run, "--yes", "--edited"]
 
     @property
     def _recorded(self) -> Path | None:

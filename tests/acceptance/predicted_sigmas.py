@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from labrig.acquire import read_run_protocol
+from labrig.analyse import Overrides
 from labrig.analyse.frames import intact_frames
-from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.series_fit import fit_series
 from labrig.cli.exit_codes import guarded
 from labrig.foundation.errors import FitError

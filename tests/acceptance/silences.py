@@ -54,7 +54,7 @@ COMMANDS = (
     *("process last --states 2", "process last --intervals", "process last --law becquerel"),
     *("runs list", "runs show last", "runs compare {first} last", "runs stack last"),
     *("figures last", "note last odd", "verify last", "key new lab", "seal last"),
-    *("frame {frame}", "compare last", "compare last --material blue-paint"),
+    *("frame {frame}", "reproduce last", "reproduce last --material blue-paint"),
     *("fit decay table.csv", "fit decay table.csv --intervals", "fit decay many.csv"),
     *("fit charge charge.csv --on 0 --off 120", "fit luminance log.csv"),
     *("material show paper.csv", "material show paper.csv --picture paper.png"),
@@ -68,11 +68,11 @@ COMMANDS = (
     *("design --constraints wish.yaml --out glow.yaml", "queue add decay --rig sim"),
     *("queue list", "queue run"),
     *("run calibration --rig sim-phosphor --yes", "run phosphor --rig sim-phosphor --yes"),
-    *("process last", "runs show last", "compare last", "figures last"),
-    *("compare last --rendered --assume-albedo 0.6", "verify last"),
+    *("process last", "runs show last", "reproduce last", "figures last"),
+    *("reproduce last --rendered --assume-albedo 0.6", "verify last"),
     *("run led_brightness --rig sim-fluorescent --yes",),
     *("run led_fluorescence --rig sim-fluorescent --yes", "process last"),
-    *("run validate_illuminants --rig sim-fluorescent --yes", "compare last --rendered"),
+    *("run validate_illuminants --rig sim-fluorescent --yes", "reproduce last --rendered"),
     *("run luminance --rig sim-luminance --yes", "run camera_curves --rig sim-chart --yes"),
 )
 

@@ -11,9 +11,8 @@ from typing import Any
 
 from filelock import FileLock
 
-from labrig.acquire import PlanClock, RunObserver
+from labrig.acquire import PlanClock, RunObserver, read_run_protocol
 from labrig.analyse import AnalysisContext, Inputs, Overrides
-from labrig.analyse.overrides import read_run_protocol
 from labrig.bench import Recording, Watch, resume_run
 from labrig.foundation import resources
 from labrig.foundation.clock import Clock

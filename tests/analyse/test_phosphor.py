@@ -18,6 +18,7 @@ from labrig.material import read_material
 from labrig.process import process_and_report
 from labrig.protocols.phosphor.result import PhosphorResult
 from labrig.record import read_run
+from labrig.results import ResultWithDecays
 from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, record
 from tests.quick_yaml import write_quickly
@@ -92,6 +93,12 @@ def test_a_chain_that_was_killed_and_resumed_ends_in_one_material(
     assert "beside blue-paint of Nalbach" in after.replace("Beside", "beside")
     assert any(line.startswith("excitation: closure") for line in processed.lines)
     assert_read_back(result)
+    # A part is fitted again by itself, with what the parts before it measured.
+    decay = result.parts["decay"]
+    assert decay.refit().to_json() == decay.to_json()
+    two = decay.refit(states=2)
+    assert isinstance(two, ResultWithDecays)
+    assert [fit.n_states for fit in two.fits.values()] == [2]
 
 
 def test_parts_see_their_own_frames_only(run: Path) -> None:

@@ -57,7 +57,7 @@ def test_a_run_ends_at_once_and_goes_on_when_the_region_is_corrected(
         protocol["patches"] = {"a": patch}
         (folder / "protocol.yaml").write_text(write_quickly(protocol))
         attempts = len(read_run(folder).attempts)
-        ended = labrig("resume", folder, "--no-process")
+        ended = labrig("resume", folder, "--no-process", "--edited")
         assert ended.code == code, ended.err
         if code:
             assert "patches.a" in ended.err

@@ -11,7 +11,9 @@ import pytest
 
 from labrig.catalogue import RunFilter, compare_runs, list_runs, summarise
 from labrig.cli.exit_codes import guarded
-from labrig.results import write_fitted_decay
+from labrig.results import SAMPLE_PICTURE, write_fitted_decay
+from tests.analyse.recorded import processed_once
+from tests.analyse.small_runs import RECORD
 from tests.conftest import Ended
 from tests.quick_yaml import read_quickly, write_quickly
 from tests.results.made import decay_result
@@ -75,12 +77,18 @@ def test_the_wanted_runs_are_listed_oldest_first(
     assert found == [f"0{day}" for day in days]
 
 
-def test_a_person_reads_one_line_a_run(week: Path, labrig: Labrig) -> None:
+def test_a_person_reads_a_table_of_samples(week: Path, labrig: Labrig) -> None:
     said = labrig("runs", "list", "--runs", week).out
-    (paint,) = (line for line in said.splitlines() if "2026-01-03" in line)
-    assert "blue-paint" in paint
-    assert "processed" in paint
-    assert re.search(r"0\.03\d+\(\d+\)", paint)
+    lines = said.splitlines()
+    assert [line for line in lines if line[0] != " "] == ["blue-paint", "green-paint"]
+    first, second = lines[1:3]
+    assert "2026-01-02" in first
+    assert "2026-01-03" in second
+    assert "processed" in second
+    assert re.search(r"k_r 0\.03\d+ ± 0\.\d+ 1/s$", second)
+    assert "2026-01-05" in lines[-1]
+    (blue, *_) = list_runs(week, RunFilter(sample="blue-paint"))
+    assert (blue.folder / "result" / SAMPLE_PICTURE).read_bytes()[1:4] == b"PNG"
     assert labrig("runs", "--runs", week).out == said
     assert "interrupted, 0 of 2" in labrig("runs", "--status=interrupted", "--runs", week).out
 
@@ -99,7 +107,12 @@ def test_runs_are_called_by_the_beginning_of_their_name(week: Path, labrig: Labr
     assert "green-paint" in shown.out
     assert "report.html" in shown.out
     assert "0 of 2" in labrig("runs", "show", "last", "--runs", week).out
-    for name, said in (("2026", "4 runs begin so"), ("2027", "there is no such run")):
+    last = "2026-01-05T00-00-00_decay_blue-paint"
+    for name, said in (
+        ("2026", "4 runs begin so"),
+        ("2027", "there is no such run"),
+        (last.replace("blue", "bleu"), f"did you mean '{last}'?"),
+    ):
         refused = labrig("runs", "show", name, "--runs", week)
         assert (refused.code, len(refused.err.splitlines())) == (2, 1)
         assert said in refused.err
@@ -129,6 +142,26 @@ def test_the_same_paint_on_two_days_agrees_and_another_one_differs(
     assert "asked differently: sample.name: blue-paint | green-paint" in said
     assert "the rates differ" in said
     assert "the rates agree" in labrig("runs", "compare", first, again).out
+
+
+def test_runs_that_cannot_be_compared_say_why(week: Path, tmp_path: Path, labrig: Labrig) -> None:
+    decay, *_, cut = (run.folder for run in list_runs(week, RunFilter()))
+    blank = RECORD["blank"](tmp_path)
+    waiting = labrig("runs", "compare", decay, blank)
+    assert (waiting.code, len(waiting.err.splitlines())) == (4, 1)
+    assert f"labrig process {blank}" in waiting.err
+    processed_once(blank)
+    for pair in ((decay, blank), (blank, decay), (blank, blank)):
+        refused = labrig("runs", "compare", *pair)
+        assert (refused.code, len(refused.err.splitlines())) == (2, 1)
+        assert "not comparable" in refused.err
+        assert ("both are runs of blank" in refused.err) == (pair == (blank, blank))
+    stacked = labrig("runs", "stack", blank)
+    assert (stacked.code, len(stacked.err.splitlines())) == (2, 1)
+    assert "got one of blank" in stacked.err
+    unfinished = labrig("runs", "compare", decay, cut)
+    assert (unfinished.code, len(unfinished.err.splitlines())) == (4, 1)
+    assert f"labrig resume {cut}" in unfinished.err
 
 
 @pytest.fixture
@@ -224,10 +257,7 @@ def test_results_are_shown_with_what_they_were_made_with(
     assert [float(rate[0]) for rate in rates] == pytest.approx([0.22, 0.22], rel=0.1)
 
 
-def test_what_cannot_be_compared_is_reported_in_a_line(week: Path, labrig: Labrig) -> None:
-    first, *_, cut = (run.folder for run in list_runs(week, RunFilter()))
-    ended = labrig("runs", "compare", first, cut)
-    assert (ended.code, len(ended.err.splitlines())) == (4, 1)
-    assert "labrig process" in ended.err
+def test_a_reference_that_is_no_patch_is_reported_in_a_line(week: Path, labrig: Labrig) -> None:
+    first, *_ = (run.folder for run in list_runs(week, RunFilter()))
     ended = labrig("runs", "compare", first, first, "--reference", "lamp")
     assert (ended.code, len(ended.err.splitlines())) == (2, 1)

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from labrig.foundation import plugins
+from labrig.foundation.yaml_file import read_yaml
 from labrig.protocols.decay.result import DecayResult
 from labrig.record import RunLock, own_digest, read_run
 from labrig.results import read_result
@@ -223,9 +224,10 @@ def test_processing_otherwise(labrig: Labrig, finished: Path) -> None:
     assert "every channel scaled to 1" in scaled.err
     rig = finished / "rig.yaml"
     rig.write_text(rig.read_text().replace("camera: canon_eos_5d_mark_ii", "camera: null"))
-    assert labrig("process", finished).code == 0
+    assert labrig("process", finished, "--edited").code == 0
     made = read_quickly((finished / "result" / "provenance.yaml").read_text())
     assert made["camera"] == "Canon EOS 5D Mark II", "by the name that it told"
+    rig.write_text(rig.read_text().replace("camera: null", "camera: canon_eos_5d_mark_ii"))
     one_line(labrig("process", finished, "--roi", "nose=1,2,3,4"), 2, "no patch is called 'nose'")
     one_line(labrig("process", finished, "--roi", "90,60,40,40"), 2, "leaves the frame")
 
@@ -501,6 +503,7 @@ def test_a_table_that_leaves_something_open_is_asked_for_an_option(
 def test_an_earlier_result_is_restored(labrig: Labrig, finished: Path) -> None:
     before = (finished / "result" / "result.json").read_bytes()
     assert labrig("process", finished, "--states", "2").code == 0
+    assert read_yaml(finished / "result" / "provenance.yaml")["given"] == ["--states 2"]
     after = (finished / "result" / "result.json").read_bytes()
     assert after != before
     (newest,) = sorted(finished.glob("result-*"), key=lambda each: int(each.name[7:]))[-1:]
@@ -515,3 +518,9 @@ def test_an_earlier_result_is_restored(labrig: Labrig, finished: Path) -> None:
     assert after in kept.values()
     assert newest.name not in kept
     one_line(labrig("runs", "restore", finished, "result-77"), 2, "expected the name of an earlier")
+    labrig("process", finished, "--states", "2")
+    again = labrig("process", finished, "--roi", "0.3,0.3,0.4,0.4").err
+    assert "not kept from the result before: --states 2; " in again
+    assert f"labrig process {finished} --states 2 --roi 0.3,0.3,0.4,0.4" in again
+    assert "--roi" in labrig("process", finished).err
+    assert "not kept" not in labrig("process", finished).err

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from labrig.analyse import Overrides
 from labrig.compare import LampsComparison, compare_lamps
 from labrig.material import read_any_material
 from labrig.optics import Spectrum, read_camera
@@ -125,7 +126,7 @@ def test_it_is_printed_for_programs_and_the_report_shows_it_while_it_is_of_its_r
     (run / "protocol.yaml").write_text(
         write_quickly(protocol | {"fluorescence": SAMPLES | {"felt": "white-paper"}})
     )
-    process_and_report(run)
+    process_and_report(run, Overrides(edited=True))
     assert "photographed and rendered" not in report.read_text()
     assert "is of another result" in report.read_text()
     felt = compare_lamps(run).lamps[0].samples["felt"]

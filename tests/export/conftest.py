@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.acquire import PlanClock, RunObserver, read_rig_file
-from labrig.analyse.overrides import read_run_protocol
+from labrig.acquire import PlanClock, RunObserver, read_rig_file, read_run_protocol
 from labrig.bench import Recording
 from labrig.foundation import resources
 from labrig.foundation.clock import Clock

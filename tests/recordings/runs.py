@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from labrig.calibration import IRRADIANCE_KIND, LVF_KIND
+from labrig.record import JOURNAL
 from tests.analyse.excitation.bench import QUICK, true_irradiance
 from tests.analyse.recorded import processed_once, record
 from tests.analyse.small_runs import RECORD
 from tests.analyse.spectral_bench import true_lvf_file
+from tests.resealed import reseal
 
 from .numbers import Difference, differences, keep_numbers
 
@@ -70,11 +72,13 @@ class Recorded:
         kept = self.folder / RUN
         shutil.rmtree(kept, ignore_errors=True)
         shutil.copytree(run, kept)
-        # A rig file names them relative to itself, wherever it lies.
-        rig = (kept / "rig.yaml").read_text(encoding="utf-8")
-        for name in self.beside(kept):
-            rig = rig.replace(str(run.parents[1] / f"{name}.yaml"), f"{name}.yaml")
-        (kept / "rig.yaml").write_text(rig, encoding="utf-8")
+        # A rig file names them relative to itself, wherever it lies; so it does in the journal.
+        for file in (kept / "rig.yaml", kept / JOURNAL):
+            text = file.read_text(encoding="utf-8")
+            for name in self.beside(kept):
+                text = text.replace(str(run.parents[1] / f"{name}.yaml"), f"{name}.yaml")
+            file.write_text(text, encoding="utf-8")
+        reseal(kept / JOURNAL)
 
     def processed(self, into: Path) -> Path:
         """The result folder of a copy of the kept run, or of it recorded anew, below `into`."""

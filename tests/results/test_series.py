@@ -93,7 +93,7 @@ SERIES = Series(
 
 
 def test_the_file_is_as_the_contract_says(tmp_path: Path) -> None:
-    SERIES.write_csv(tmp_path / "series.csv")
+    write_series(tmp_path / "series.csv", [SERIES])
     assert (tmp_path / "series.csv").read_text().splitlines() == [
         "t_s,exposure_s,R (DN/s),R_sigma (DN/s),G (DN/s),G_sigma (DN/s),iso,f_number,frame,unit,"
         "region,flag",
@@ -153,7 +153,7 @@ def test_what_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="same channels"):
         write_series(tmp_path / "series.csv", [SERIES, other])
     with pytest.raises(DiskError, match="cannot be written"):
-        SERIES.write_csv(tmp_path / "missing" / "series.csv")
+        write_series(tmp_path / "missing" / "series.csv", [SERIES])
 
 
 @settings(max_examples=60, deadline=None)

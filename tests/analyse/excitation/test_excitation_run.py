@@ -129,7 +129,7 @@ def test_without_knowing_the_light_it_says_what_to_do(run: Path) -> None:
     try:
         path.write_text("\n".join(line for line in kept.splitlines() if "irradiance:" not in line))
         with pytest.raises(DataError, match="run irradiance and name its run"):
-            process_run(run)
+            process_run(run, Overrides(edited=True))
     finally:
         path.write_text(kept)
 

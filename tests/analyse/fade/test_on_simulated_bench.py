@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from labrig.acquire import PlanClock, RunObserver
+from labrig.analyse import Overrides
 from labrig.calibration import FADE_KIND, Change, FadeFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.clock import Clock
@@ -165,7 +166,7 @@ def test_without_the_lamps_spectrum_it_says_what_is_missing(run: Path, result: F
     path = run / "rig.yaml"
     path.write_text(path.read_text().replace("lamp: halogen_3000k\n", "lamp: null\n"))
     with pytest.raises(UsageError, match="which lamp it has"):
-        process_run(run)
+        process_run(run, Overrides(edited=True))
 
 
 def test_what_a_cold_lamp_lacks_is_the_rooms(fade: FadeFile, result: FadeResult) -> None:
