@@ -8,6 +8,7 @@ import ast
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Literal
 
@@ -24,7 +25,7 @@ _FORMATS = re.compile(r"\{(\w+)[^{}]*\}")
 _LETTERS = {
     r"\lambda": "λ", r"\Lambda": "Λ", r"\chi": "χ", r"\sigma": "σ", r"\kappa": "κ", r"\tau": "τ",
     r"\beta": "β", r"\Delta": "Δ", r"\Phi": "Φ", r"\ln": "ln", r"\cdot": "·", r"\,": " ",
-    r"\le": "≤", r"\ge": "≥", r"\approx": "≈", r"\sum": "Σ", r"\mathrm": "", "^2": "²",
+    r"\le": "≤", r"\ge": "≥", r"\approx": "≈", r"\sum": "Σ", "^2": "²",
 }  # fmt: skip
 
 
@@ -112,8 +113,10 @@ def _terms(page: str) -> Iterator[Explanation]:
     """Yield the terms of the glossary, whose texts are indented."""
     body = page.partition("```{glossary}\n")[2].partition("\n```")[0]
     for entry in re.split(r"\n\n(?=\S)", body):
-        name, _, text = entry.strip().partition("\n")
-        yield Explanation("term", name, "", _plain(text))
+        lines = entry.strip().splitlines()
+        names = list(takewhile(lambda line: not line.startswith(" "), lines))
+        text = _plain("\n".join(lines[len(names) :]))
+        yield from (Explanation("term", name, "", text) for name in names)
 
 
 def _warnings(page: str) -> Iterator[Explanation]:
@@ -132,8 +135,10 @@ def _warnings(page: str) -> Iterator[Explanation]:
 
 def _plain(text: str) -> str:
     """Return Markdown of the glossary as a terminal shows it, in one paragraph."""
+    text = re.sub(r"\\mathrm\{(.*?)\}", r"\1", text).replace("^{-1}", "⁻¹")
     for command, letter in _LETTERS.items():
         text = text.replace(command, letter)
+    text = re.sub(r"_\{(.*?)\}", r"_\1", text)
     text = _TERM.sub(lambda match: next(filter(None, match.groups())), text)
     return " ".join(text.replace("$", "").replace("*", "").split())
 

@@ -22,8 +22,18 @@ def test_a_code_has_its_kind_and_its_sentence() -> None:
 
 def test_a_term_is_plain_text() -> None:
     term = next(each for each in explain("amplitude") if each.kind == "term")
-    assert "Λ_i k_{r,i} r_i(0)" in term.text
+    assert "Λ_i k_r,i r_i(0)" in term.text
     assert not {"$", "`", "\\", "{term}"} & set(term.text)
+
+
+@pytest.mark.parametrize(
+    ("symbol", "term"),
+    [("k_r", "re-radiation rate"), ("k_e", "excitation rate"), ("r(0)", "concentration")],
+)
+def test_a_symbol_is_explained_as_its_term(symbol: str, term: str) -> None:
+    texts = {each.text for each in explain(symbol)}
+    assert {each.text for each in explain(term)} <= texts
+    assert not {"{", "}", "^"} & set("".join(texts))
 
 
 def test_an_unknown_name_has_a_near_one() -> None:
