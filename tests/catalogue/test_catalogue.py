@@ -151,11 +151,12 @@ def test_runs_that_cannot_be_compared_say_why(week: Path, tmp_path: Path, labrig
     assert (waiting.code, len(waiting.err.splitlines())) == (4, 1)
     assert f"labrig process {blank}" in waiting.err
     processed_once(blank)
-    for pair in ((decay, blank), (blank, decay), (blank, blank)):
+    other = Path(shutil.copytree(blank, tmp_path / "other"))
+    for pair in ((decay, blank), (blank, decay), (blank, other)):
         refused = labrig("runs", "compare", *pair)
         assert (refused.code, len(refused.err.splitlines())) == (2, 1)
         assert "not comparable" in refused.err
-        assert ("both are runs of blank" in refused.err) == (pair == (blank, blank))
+        assert ("both are runs of blank" in refused.err) == (pair == (blank, other))
     stacked = labrig("runs", "stack", blank)
     assert (stacked.code, len(stacked.err.splitlines())) == (2, 1)
     assert "got one of blank" in stacked.err
