@@ -61,6 +61,8 @@ class Continuation:
         others = [_gap_s(*pair) for pair in pairs if _settings(pair[0]) != _settings(pair[1])]
         frame_time_s = min(_at_once_s(alike, declared.frame_time_s), declared.frame_time_s)
         change_s = max(_at_once_s(others, frame_time_s + declared.change_s) - frame_time_s, 0.0)
+        if declared.change_s:
+            change_s = min(change_s, declared.change_s)
         readings_s = [2 * half_s for each in self.record.attempts for half_s in _reading_s(each)]
         # A longer one waited for a sequence to begin.
         return Pace(
