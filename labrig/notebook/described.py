@@ -52,8 +52,8 @@ def describe(result: Any) -> Description:
         title, run = record.began_with("sample"), record.name
     of_run = isinstance(result, RunResult) and record is not None
     sections = rendered_result(result).sections if of_run else sections_of(result)
-    fit = getattr(result, "fit", None)
-    warnings = getattr(result, "warnings", getattr(fit, "warnings", ()))
+    of_fit = getattr(getattr(result, "fit", None), "warnings", ())
+    warnings = getattr(result, "warnings", of_fit)
     return Description(kind, title, run, as_warnings(warnings), tuple(sections))
 
 

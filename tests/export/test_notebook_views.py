@@ -74,7 +74,7 @@ def test_a_table_has_the_numbers_of_its_file(finished: Finished) -> None:
     )
     values = result.to_pandas("values").set_index("quantity")
     state = values.loc["patches.sample.fit.states.1.k_r_per_s"]
-    (rate,) = labrig.read_result(finished.folder).patches["sample"].fit.rates
+    (rate,) = finished.result.fits["sample"].rates
     assert (state.value, state.sigma, state.unit) == (rate.value, rate.sigma, "1/s")
     assert values.loc["patches.sample.fit.states.1.amplitude", "unit"] == "DN/s"
     assert not values.index.str.endswith("_sigma").any()
