@@ -93,12 +93,14 @@ def test_a_command_in_a_folder_from_elsewhere_is_run_only_if_asked_for(
     path = run.run_folder / "rig.yaml"
     command = [sys.executable, "-c", NOTES, str(told)]
     path.write_text(write_quickly(read_quickly(path.read_text()) | {"on_finish": command}))
-    ended = labrig("resume", run.run_folder, "--no-process")
+    resume = ("resume", run.run_folder, "--no-process")
+    assert labrig(*resume, "--on-finish").code == 0
+    assert not told.exists(), "the journal has no command"
+    ended = labrig(*resume, "--edited")
     assert (ended.code, told.exists()) == (0, False)
-    (note,) = [line for line in ended.err.splitlines() if line.startswith("note:")]
+    (note,) = [line for line in ended.err.splitlines() if "--on-finish" in line]
     assert str(told) in note
-    assert "--on-finish" in note
-    assert labrig("resume", run.run_folder, "--no-process", "--on-finish").code == 0
+    assert labrig(*resume, "--edited", "--on-finish").code == 0
     assert json.loads(told.read_text())["LABRIG_STATUS"] == "done"
 
 

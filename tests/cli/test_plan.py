@@ -186,8 +186,8 @@ def test_a_disk_that_is_too_small_is_refused_by_plan_run_and_resume(
     for arguments in (
         ("plan", make_protocol(), "--rig", rig),
         ("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs"),
-        ("resume", folder),
+        ("resume", folder, "--edited"),
     ):
         ended = labrig(*arguments)
-        assert (ended.code, ended.err.count("\n")) == (5, 1)
+        assert (ended.code, ended.err.count("labrig: ")) == (5, 1)
         assert "are free" in ended.err
