@@ -348,17 +348,14 @@ def _find_folder(run: Path, runs: Path) -> Path:
         require_kind(run, RUN)
     if not matches and run.exists() and (around := run_around(run)) is not None:
         raise UsageError(f"{run}: this is a part of a run; the run is {around}")
-    problem = f"{len(matches)} runs begin so" if matches else _no_such_run(str(run), runs)
+    problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
+    names = [path.name for path in _run_folders(runs, "")]
+    close = get_close_matches(str(run), names, n=1)
+    suggestion = f"; did you mean '{close[0]}'?" if close and not matches else ""
     raise UsageError(
-        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}; see: "
-        f"labrig runs --runs {runs}"
+        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "
+        f"labrig runs --runs {runs}{suggestion}"
     )
-
-
-def _no_such_run(name: str, runs: Path) -> str:
-
-    near = get_close_matches(name, [path.name for path in _run_folders(runs, "")], 1)
-    return f"there is no such run, did you mean '{near[0]}'?" if near else "there is no such run"
 
 
 def _run_folders(runs: Path, beginning: str) -> Iterator[Path]:

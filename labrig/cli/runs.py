@@ -215,9 +215,9 @@ def compare(
     from labrig.catalogue import compare_runs, find_run
 
     first, second = find_run(run, runs), find_run(other, runs)
+    comparison = compare_runs(first, second, reference)
     if first.resolve() == second.resolve():
         raise UsageError(f"expected two runs, got {first} twice; name another one (labrig runs)")
-    comparison = compare_runs(first, second, reference)
     if json:
         patches = [
             {**asdict(patch), "assessment": patch.assessment} for patch in comparison.patches

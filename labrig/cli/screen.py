@@ -103,7 +103,9 @@ def laid_out(line: str, width: int, hanging: int | None = None) -> Iterator[str]
             laid += gap + cell
             continue
         whole = _WITHIN_QUANTITY.sub("\N{NO-BREAK SPACE}", cell)
-        if laid.strip() and _cells(margin + cell) <= width:
+        begins = laid + gap + whole.split(" ", 1)[0]
+        is_for_next_line = _cells(margin + cell) <= width or _cells(begins) > width
+        if laid.strip() and is_for_next_line:
             yield laid.rstrip()
             start, gap = margin, ""
         else:

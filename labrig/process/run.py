@@ -7,7 +7,13 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from labrig.acquire import ProtocolModel, RigFile, result_takes_edits
+from labrig.acquire import (
+    EDITED,
+    ProtocolModel,
+    RigFile,
+    read_run_protocol,
+    result_takes_edits,
+)
 from labrig.analyse import (
     AnalysisContext,
     Inputs,
@@ -316,6 +322,11 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     return Processed(result.of_run(folder), page, rendered.lines, changes, not_kept)
 
 
+def _dimness(frame: FrameRecord) -> tuple[bool, float]:
+    """Return a rank: metered frames are the shorter, the brighter it is; brief ones are noisy."""
+    return frame.exposure_s < BRIEF_S, frame.exposure_s * frame.iso
+
+
 def _analysed(
     run: RunRecord, protocol: ProtocolModel, rig: RigFile, overrides: Overrides
 ) -> tuple[AnalysisContext, RunResult, CameraResponse | None]:
@@ -371,14 +382,11 @@ def refit(result: RunResult, options: Mapping[str, Any]) -> RunResult:
     """
     folder = _folder_of(result)
     made = read_model(folder / "result" / PROVENANCE, Provenance)
-    edited = result_takes_edits(folder)
-    protocol = Overrides(edited=edited).protocol(folder)
+    is_edited = EDITED in made.given
+    protocol = read_run_protocol(folder, edited=is_edited)
+    regions = made.regions if hasattr(protocol, "patches") else {}
     overrides = Overrides(
-        regions=made.regions if hasattr(protocol, "patches") else {},
-        excluded=frozenset(made.excluded),
-        optics=made.optics,
-        options=options,
-        edited=edited,
+        regions, frozenset(made.excluded), None, made.optics, options, edited=is_edited
     )
     check_options(options, protocol)
     with RunLock(folder / LOCK, "processing this run"):
@@ -442,11 +450,6 @@ def rendered_result(result: RunResult) -> Rendered:
     chain: Any = protocol
     link = next(link for link in chain.chain() if link.name == result.run_part)
     return render(result, replace(source, run=run.part(link.name), protocol=link.protocol))
-
-
-def _dimness(frame: FrameRecord) -> tuple[bool, float]:
-    """Return a rank: metered frames are the shorter, the brighter it is; brief ones are noisy."""
-    return frame.exposure_s < BRIEF_S, frame.exposure_s * frame.iso
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:

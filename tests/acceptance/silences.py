@@ -1,11 +1,13 @@
-"""Longest silence of each command on a terminal.
+"""Longest silence of each command on a terminal, and lines that the terminal breaks.
 
-    python -m tests.acceptance.silences [--only WORDS ...]
+    python -m tests.acceptance.silences [--columns 80] [--only WORDS ...]
 
-Every command runs under a pseudo-terminal of 80 columns, in one folder, in which the first ones
+Every command runs under a pseudo-terminal of some columns, in one folder, in which the first ones
 make the runs and files that later ones need. Printed are its duration, the longest time without any
 output, and the last line on the screen before that. A silence is wrong from 2 s on. Time in which
-the command waited for a processor that other programs had does not count.
+the command waited for a processor that other programs had does not count. Wrong, too, is a line
+that is longer than the terminal is wide, unless a single word of it is: the terminal would break
+it within words and numbers.
 """
 
 import argparse
@@ -23,6 +25,7 @@ from math import exp, log
 from pathlib import Path
 
 import numpy as np
+from rich.cells import cell_len
 
 from labrig.material import ReradiationMatrix, write_reradiation
 from tests.material.reradiation.formats.matrices import two_dyes
@@ -128,17 +131,18 @@ class Timed:
     wall_s: float
     silence_s: float
     before: str
+    too_wide: list[str]
 
 
-def timed(command: str, folder: Path) -> Timed:
-    """Run a command under a pseudo-terminal of 80 columns."""
+def timed(command: str, folder: Path, columns: int) -> Timed:
+    """Run a command under a pseudo-terminal."""
     import fcntl
     import pty
     import struct
     import termios
 
     ours, theirs = pty.openpty()
-    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
     began_s = last_s = time.monotonic()
     process = subprocess.Popen(
         [sys.executable, "-m", "labrig", *shlex.split(command)],
@@ -146,7 +150,7 @@ def timed(command: str, folder: Path) -> Timed:
         env={**os.environ, "XDG_CONFIG_HOME": str(folder), "HOME": str(folder)},
     )  # fmt: skip
     os.close(theirs)
-    silence_s, before, screen = 0.0, "", ""
+    silence_s, before, screen, all_of_it = 0.0, "", "", bytearray()
     waited_s = _waited_s(process.pid)
     while time.monotonic() - began_s < MAX_S:
         ready, _, _ = select.select([ours], [], [], 0.1)
@@ -162,12 +166,14 @@ def timed(command: str, folder: Path) -> Timed:
             break
         if not printed:
             break
+        all_of_it += printed
         last_s, waited_s = now_s, _waited_s(process.pid)
         screen = _last_line(screen + printed.decode("utf-8", "replace"))
     else:
         process.terminate()
     os.close(ours)
-    return Timed(process.wait(), time.monotonic() - began_s, silence_s, before)
+    too_wide = _too_wide(all_of_it.decode("utf-8", "replace"), columns)
+    return Timed(process.wait(), time.monotonic() - began_s, silence_s, before, too_wide)
 
 
 def _waited_s(pid: int) -> dict[str, float]:
@@ -185,8 +191,22 @@ def _longest_wait_s(pid: int, before_s: dict[str, float]) -> float:
     return max((now_s[task] - before_s.get(task, 0.0) for task in now_s), default=0.0)
 
 
+def _too_wide(text: str, columns: int) -> list[str]:
+    """Return lines that the terminal breaks though their words would fit."""
+    lines = [line.rpartition("\r")[2] for line in _plain(text).replace("\r\n", "\n").split("\n")]
+    return [
+        line
+        for line in lines
+        if cell_len(line) > columns and max(map(cell_len, line.split())) + 4 <= columns / 2
+    ]
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text)
+
+
 def _last_line(text: str) -> str:
-    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text)
+    plain = _plain(text)
     lines = [line.strip() for line in re.split(r"[\r\n]", plain) if line.strip()]
     return lines[-1] if lines else ""
 
@@ -195,7 +215,9 @@ def main() -> None:
     """Print a line for each command; exit code 1 if one is silent for too long."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="*", help="words of commands; default: all")
-    only = parser.parse_args().only
+    parser.add_argument("--columns", type=int, default=80, help="of the terminal")
+    asked = parser.parse_args()
+    only = asked.only
     wrong = 0
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
@@ -208,12 +230,13 @@ def main() -> None:
             full = command.format(
                 first=runs[0].name if runs else "", frame=frames[-1] if frames else ""
             )
-            done = timed(full, folder)
-            is_wrong = done.silence_s > MAX_SILENCE_S or done.exit_code != 0
+            done = timed(full, folder, asked.columns)
+            is_wrong = done.silence_s > MAX_SILENCE_S or done.exit_code != 0 or bool(done.too_wide)
             wrong += is_wrong
             print(
                 f"{done.wall_s:7.1f} s  silent {done.silence_s:5.2f} s  labrig {command}"
-                + (f"\n    exit code {done.exit_code}, after: {done.before}" if is_wrong else ""),
+                + (f"\n    exit code {done.exit_code}, after: {done.before}" if is_wrong else "")
+                + "".join(f"\n    too wide: {line}" for line in done.too_wide[:5]),
                 flush=True,
             )
     print(f"{len(COMMANDS)} commands, {wrong} wrong")

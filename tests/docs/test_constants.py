@@ -36,29 +36,29 @@ STATED = {
         f"a grid of rates, at most {variable_projection.COMBINATIONS},",
         f"searched from 1/{series.SLOWEST_SPANS:.0f} of the inverse length",
         f"improbable at the level {selection.F_TEST_LEVEL:g}",
-        f"known to {100 * states.ILL_DETERMINED:.0f} % or better, or BIC falls by more than "
+        f"known to {100 * states.ILL_DETERMINED:.0f} % or better. A fall of BIC by more than "
         f"{selection.REFUTING_BIC:.0f} (odds of "
         f"{round(math.exp(selection.REFUTING_BIC / 2), -1):.0f} : 1)",
         f"when a step gains less than {states.CANDIDATE_GAIN:g} in",
-        f"odds of 1 : {1 / further_state.PRIOR_ODDS:.0f} that there is one, and a half-normal "
-        f"prior of $a$ whose scale is {100 * further_state.USUAL_SHARE:.0f} % of all",
-        f"where $P > 1/{1 / further_state.POSSIBLE:.0f}$. Where "
-        f"$P > 1/{1 / further_state.LIKELY:.0f}$ a",
+        f"prior odds of a fast state are 1 : {1 / further_state.PRIOR_ODDS:.0f}, and $a$ has a "
+        f"half-normal prior whose scale is {100 * further_state.USUAL_SHARE:.0f} % of all",
+        f"Where $P > 1/{1 / further_state.POSSIBLE:.0f}$,",
+        f"Where $P > 1/{1 / further_state.LIKELY:.0f}$, a",
         f"$\\beta$ is more than {fit_warnings.BEND_SIGMAS:.0f} σ from zero",
         f"on a grid of {rate_spectrum.RATES} rates",
-        f"more than {selection.PREFERRED_BIC:.0f} in BIC; by more than "
-        f"{STRONG_EVIDENCE_DELTA_BIC:.0f} "
+        f"better by more than {selection.PREFERRED_BIC:.0f} in BIC",
+        f"better by more than {STRONG_EVIDENCE_DELTA_BIC:.0f} "
         f"(odds of {round(math.exp(STRONG_EVIDENCE_DELTA_BIC / 2), -1):.0f} to 1)",
     ],
     "how-to/dark_room.md": [
         f"Its limit is {100 * check.LIGHT:g} % of the range in {camera.LONG_S:.0f} s",
         f"goes on trying for {guard.TRIES_FOR_S / 60:.0f} min. If labrig hangs or is stopped for "
         f"{guard.HANG_TIMEOUT_S} s",
-        f"is waited for, for up to {execution.COMES_BACK_S / 60:.0f} min",
+        f"waits for it for up to {execution.COMES_BACK_S / 60:.0f} min",
     ],
     "how-to/fluorescent.md": [
-        f"some number is {noise.CLEAR_SIGMAS:.0f} σ above zero and those of both neighbouring "
-        f"columns are {noise.BESIDE_SIGMAS:.0f} σ",
+        f"some number is {noise.CLEAR_SIGMAS:.0f} σ above zero and the same numbers of both "
+        f"neighbouring columns are {noise.BESIDE_SIGMAS:.0f} σ",
     ],
     "how-to/luminance.md": [
         f"within a factor of {math.exp(luminance.NEAR):.1f} in time",
