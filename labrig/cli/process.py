@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperCommand
 
 from labrig.cli.completion import complete_run
+from labrig.cli.screen import echo
 from labrig.cli.wording import EDITED
 from labrig.foundation.result_warning import warning_lines
 
@@ -176,7 +177,7 @@ def process(
     folder = find_run(run, runs)
     if verify:
         discard_cache(folder)
-        typer.echo(verify_frames(read_run(folder), overrides), err=True)
+        echo(verify_frames(read_run(folder), overrides), err=True)
     process_and_print(folder, overrides, json=json)
     typer.echo(folder)
 
@@ -187,7 +188,7 @@ def print_edits(run: Path, *, is_taken: bool) -> None:
 
     used = "the file's is used" if is_taken else f"the journal's is used; {EDITED} takes the file's"
     for line in edited_keys(run):
-        typer.echo(f"note: {line}; {used}", err=True)
+        echo(f"note: {line}; {used}", err=True)
 
 
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
@@ -202,7 +203,7 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
         processed = process_and_report(run, overrides)
     if processed.not_kept:
         again = " ".join(map(_quoted, (*processed.not_kept, *overrides.given())))
-        typer.echo(
+        echo(
             f"note: not kept from the result before: {', '.join(processed.not_kept)}; each "
             "processing starts from the protocol; to keep them: labrig process "
             f"{shlex.quote(str(run))} {again}",
@@ -212,12 +213,12 @@ def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: 
         typer.echo(processed.result.to_json())
         return
     for line in warning_lines(processed.result.warnings, "warning: "):
-        typer.echo(line, err=True)
+        echo(line, err=True)
     for text in processed.lines:
-        typer.echo(text)
+        echo(text)
     for number, line in enumerate(processed.changes):
-        typer.echo(f"  {line}" if number else line)
-    typer.echo(f"report: {processed.report}")
+        echo(f"  {line}" if number else line)
+    echo(f"report: {processed.report}")
 
 
 def _quoted(option: str) -> str:

@@ -9,7 +9,7 @@ import typer
 from labrig.cli.completion import complete_protocol
 from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.protocol import protocol_path
-from labrig.cli.screen import echo_table
+from labrig.cli.screen import echo, echo_table
 from labrig.foundation.activity import activity
 from labrig.foundation.named_files import beside, is_path
 
@@ -62,7 +62,7 @@ def add(
         source = _from(folder, protocol, protocol_path(protocol))
         added.append(QueuedRun(protocol=source, rig=named_rig, set=changes))
     now = change_queue(queue, lambda before: Queue(runs=(*before.runs, *added)))
-    typer.echo(f"{len(added)} added, {len(now.runs)} in {queue}; labrig queue run measures them")
+    echo(f"{len(added)} added, {len(now.runs)} in {queue}; labrig queue run measures them")
 
 
 @app.command("list")
@@ -78,9 +78,9 @@ def list_(
 
     listed = entries(read_queue(queue), runs)
     if json:
-        typer.echo(dumps([_content(entry) for entry in listed], indent=1))
+        echo(dumps([_content(entry) for entry in listed], indent=1))
     elif not listed:
-        typer.echo(f"nothing in {queue}")
+        echo(f"nothing in {queue}")
     else:
         table = queue_report(queue.stem, listed).sections[0].tables[0]
         echo_table(table.head, table.rows)
@@ -150,7 +150,7 @@ class _Person:
         self._terminal.ask(step, None, step.takes_s, lambda: None)
 
     def tell(self, text: str) -> None:
-        typer.echo(text, err=True)
+        echo(text, err=True)
 
 
 def _content(entry: "QueueEntry") -> dict[str, object]:

@@ -104,7 +104,7 @@ def reproduce(
         _print_json(content if room is None else content | {"rendered": room.content})
         return
     for line in warning_lines(warnings, "warning: "):
-        typer.echo(line, err=True)
+        echo(line, err=True)
     drawn = out or folder / "comparison"
     for section in (*pages, *(() if room is None else room.sections)):
         _print_section(section)
@@ -112,9 +112,9 @@ def reproduce(
     if room is None:
         return
     write_rendered(drawn / TABLE, room.comparison)
-    typer.echo(f"table: {drawn / TABLE}")
+    echo(f"table: {drawn / TABLE}")
     if room.scene is not None:
-        typer.echo(f"scene: {room.scene.write(drawn)}")
+        echo(f"scene: {room.scene.write(drawn)}")
     if out is None:
         options = _options(material, white, camera, assume_albedo, assume_scale)
         _show_in_report(folder, room.sections, options)
@@ -209,9 +209,9 @@ def _show_in_report(folder: Path, pages: "tuple[Section, ...]", options: list[st
     made = replace(pages[0], text=(*pages[0].text, f"Made by: {command}"))
     report = folder / "result" / "report.html"
     if show_comparison(folder, (made, *pages[1:])):
-        typer.echo(f"report: {report}")
+        echo(f"report: {report}")
     else:
-        typer.echo(
+        echo(
             f"note: {report} has no place for it; make the report again: labrig process {folder}",
             err=True,
         )
@@ -247,7 +247,7 @@ def _save_figures(section: "Section", folder: Path) -> None:
             figure.patch.set(visible=True, facecolor="white")
             for suffix in ("png", "pdf"):
                 save_picture(figure, folder / f"{picture.name}.{suffix}", dpi=200)
-        typer.echo(f"figure: {folder / picture.name}.png")
+        echo(f"figure: {folder / picture.name}.png")
 
 
 def _print_json(content: dict[str, Any]) -> None:

@@ -12,6 +12,7 @@ from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.detachable_stream import DetachableStream
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.cli.protocol import protocol_path
+from labrig.cli.screen import echo
 from labrig.cli.wording import EDITED
 from labrig.foundation.activity import activity
 from labrig.foundation.clock import Interrupted
@@ -101,7 +102,7 @@ def plan(
 
     recording = _prepared(protocol, rig_path(rig), runs)
     if not json:
-        typer.echo("\n".join([*summary(recording, free_disk_bytes(runs)), ""]))
+        echo("\n".join([*summary(recording, free_disk_bytes(runs)), ""]))
     if predict:
         predict_and_print(recording, predict, like, metered, json=json)
     elif like or metered:
@@ -110,7 +111,7 @@ def plan(
         typer.echo(recording.plan.to_json())
     else:
         lines = recording.plan.lines() if every_step else folded_units(recording.plan)
-        typer.echo("\n".join(lines))
+        echo("\n".join(lines))
 
 
 def resume(
@@ -185,9 +186,7 @@ def _prepared(protocol: str, rig: Path, runs: Path) -> "Recording":
 def _print_processed(folder: Path, json: bool) -> None:
     from labrig.results import read_result
 
-    typer.echo(
-        f"nothing to resume: all units are complete; labrig process {folder} fits again", err=True
-    )
+    echo(f"nothing to resume: all units are complete; labrig process {folder} fits again", err=True)
     if json:
         typer.echo(read_result(folder).to_json())
     typer.echo(folder)
@@ -206,5 +205,5 @@ def _finish(folder: Path, no_process: bool, json: bool) -> None:
     if not json:
         from labrig.record import RunSize
 
-        typer.echo(f"this run takes {RunSize.measured(folder)}")
+        echo(f"this run takes {RunSize.measured(folder)}")
     typer.echo(folder)

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.inline_picture import InlinePictures
 from labrig.cli.runs_table import printable, progress_text, runs_csv, samples_table
+from labrig.cli.screen import echo, echo_table
 from labrig.cli.wording import counted, measurement
 from labrig.foundation.errors import UsageError
 from labrig.foundation.result_warning import warning_lines
@@ -112,7 +113,7 @@ def list_them(
     elif summaries:
         _print_runs(summaries, thumbnails=thumbnails)
     else:
-        typer.echo(f"no such runs in {runs}")
+        echo(f"no such runs in {runs}")
 
 
 @app.command("show")
@@ -127,21 +128,21 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
         about = {"notes": notes, "unfinished": unfinished(summary), "edited": edits}
         _print_json({**_summary_json(summary), **about})
         return
-    typer.echo(f"{folder}")
+    echo(f"{folder}")
     measured = measurement(summary.protocol, summary.sample)
-    typer.echo(f"  {measured}, {_when(summary)}, {summary.status}")
+    echo(f"  {measured}, {_when(summary)}, {summary.status}")
     units = "unit" if summary.units == 1 else "units"
-    typer.echo(f"  {progress_text(summary)} {units}, {counted(summary.frames, 'frame')}")
+    echo(f"  {progress_text(summary)} {units}, {counted(summary.frames, 'frame')}")
     for line in unfinished(summary):
-        typer.echo(f"  {printable(line)}")
+        echo(f"  {printable(line)}")
     for line in edits:
-        typer.echo(f"  {printable(line)}; the journal's counts")
+        echo(f"  {printable(line)}; the journal's counts")
     _print_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():
-        typer.echo(f"  report: {report}")
+        echo(f"  report: {report}")
     if notes:
-        typer.echo("\n" + notes.rstrip())
+        echo("\n" + notes.rstrip())
 
 
 @app.command("restore")
@@ -156,9 +157,9 @@ def restore(
 
     folder = find_run(run, runs)
     lines = restore_result(folder, result)
-    typer.echo(f"{folder}: {result} is its result again")
+    echo(f"{folder}: {result} is its result again")
     for line in lines:
-        typer.echo(f"  {line}")
+        echo(f"  {line}")
 
 
 @app.command("stack")
@@ -194,8 +195,8 @@ def stack(
     table = path.with_suffix(".csv")
     lines = [f"{each.path.name},{each.t_s:.6f},{each.exposure_s:.9g}" for each in ordered]
     write_text(table, "\n".join(["frame,t_s,exposure_s", *lines]) + "\n")
-    typer.echo(f"{path}: {times} times, {channels} channels, {columns} × {rows} pixels, in DN/s")
-    typer.echo(f"{table}: begin after lamp off and exposure time of each")
+    echo(f"{path}: {times} times, {channels} channels, {columns} × {rows} pixels, in DN/s")
+    echo(f"{table}: begin after lamp off and exposure time of each")
 
 
 @app.command("compare")
@@ -262,7 +263,7 @@ def trap_depth(
         typer.echo(trap_depths_json(depths, names))
     else:
         for each in depths:
-            typer.echo(f"{each.name}\n{each.depth}\n")
+            echo(f"{each.name}\n{each.depth}\n")
     if out is not None:
         typer.echo(f"report: {report_trap_depths(depths, names, out)}", err=json)
 
@@ -297,7 +298,7 @@ def note(
     from labrig.foundation.clock import SystemClock
     from labrig.record import add_note
 
-    typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
+    echo(add_note(find_run(run, runs), text, SystemClock().wall()))
 
 
 def _print_runs(summaries: Sequence["RunSummary"], *, thumbnails: bool) -> None:
@@ -308,38 +309,34 @@ def _print_runs(summaries: Sequence["RunSummary"], *, thumbnails: bool) -> None:
 
 
 def _print_comparison(comparison: "Comparison") -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     from labrig.foundation.number_format import plus_minus
 
     for key, value_a, value_b in comparison.protocol_differences:
-        typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
+        echo(f"asked differently: {key}: {value_a} | {value_b}")
     for line in warning_lines(comparison.warnings, "warning: "):
-        typer.echo(line)
+        echo(line)
     if comparison.missing:
-        typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
+        echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
     if not comparison.patches:
-        typer.echo("no patch is fitted in both")
+        echo("no patch is fitted in both")
     for patch in comparison.patches:
-        typer.echo(f"{patch.patch}: {patch.assessment}")
-        table = Table(box=None, pad_edge=False)
-        for title in ("", "run A", "run B", "B − A in σ"):
-            table.add_column(title)
-        for difference in patch.differences:
-            table.add_row(
+        echo(f"{patch.patch}: {patch.assessment}")
+        rows = [
+            (
                 " in ".join(filter(None, (difference.quantity, difference.unit))),
                 plus_minus(difference.a.value, difference.a.sigma),
                 plus_minus(difference.b.value, difference.b.sigma),
                 "–" if math.isnan(difference.pull) else f"{difference.pull:+.1f}".replace("-", "−"),
             )
-        if patch.differences:
-            Console().print(table)
+            for difference in patch.differences
+        ]
+        if rows:
+            echo_table(("", "run A", "run B", "B − A in σ"), rows)
         if patch.gain.sigma:
             gain = plus_minus(patch.gain.value, patch.gain.sigma)
-            typer.echo(f"a of run B is multiplied by {gain}, by the reference")
+            echo(f"a of run B is multiplied by {gain}, by the reference")
     if not any(patch.gain.sigma for patch in comparison.patches):
-        typer.echo("a is in each day's own DN/s; a source that stays, as --reference, ties them")
+        echo("a is in each day's own DN/s; a source that stays, as --reference, ties them")
 
 
 def _print_results(folder: Path) -> None:
@@ -350,12 +347,12 @@ def _print_results(folder: Path) -> None:
     results = _result_folders(folder)
     for result, before in itertools.zip_longest(results, results[1:]):
         if lines := read_summary(folder / result):
-            typer.echo(f"  {result}:")
+            echo(f"  {result}:")
             for line in lines:
-                typer.echo(f"    {printable(line)}")
+                echo(f"    {printable(line)}")
         if before is not None:
             for line in other_settings(folder / before, folder / result):
-                typer.echo(f"    {line}")
+                echo(f"    {line}")
 
 
 def _result_folders(folder: Path) -> list[str]:

@@ -1,10 +1,9 @@
 """The table of samples with their runs, for terminals of any width and for pipes, and its CSV."""
 
 import math
-import re
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import shorten
 from typing import TYPE_CHECKING, Self
 
 import typer
@@ -14,6 +13,7 @@ from labrig.cli.inline_picture import (
     ROWS as PICTURE_ROWS,
     InlinePictures,
 )
+from labrig.cli.screen import laid_out
 
 if TYPE_CHECKING:
     from labrig.catalogue import RunSummary
@@ -37,10 +37,6 @@ _COLOURS = {
     "damaged": "red",
     "processed": "green",
 }
-#: Blanks within a number with its σ and unit, where no line is broken.
-_WITHIN_NUMBER = re.compile(r" (?=[±×<>=])|(?<=[±×<>=]) |(?<=[\d)⁰-⁹]) (?=[^\W\d]|[%°]|1/)")
-#: Stands for a blank within a number while lines are broken; of private use, and no blank itself.
-_NO_BREAK = "\ue000"
 
 
 def samples_table(
@@ -158,13 +154,10 @@ def _results(run: "RunSummary", columns: int | None) -> Iterator[str]:
     """Yield the lines of a run's result, no number of which is broken."""
     decays = [_decay_text(*decay) for decay in run.parameters.items()]
     for text in decays or [run.headline]:
-        unbroken = _WITHIN_NUMBER.sub(_NO_BREAK, " ".join(printable(text).split()))
+        line = " ".join(printable(text).split())
         if not decays:
-            unbroken = textwrap.shorten(unbroken, HEADLINE_LENGTH, placeholder=" …")
-        folded = textwrap.wrap(
-            unbroken, columns or len(unbroken) + 1, break_long_words=False, break_on_hyphens=False
-        )
-        yield from (line.replace(_NO_BREAK, " ") for line in folded)
+            line = shorten(line, HEADLINE_LENGTH, placeholder=" …")
+        yield from [line] if columns is None else laid_out(line, columns, hanging=0)
 
 
 def _decay_text(patch: str, parameters: Mapping[str, "Measured"]) -> str:
