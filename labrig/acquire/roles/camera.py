@@ -93,7 +93,8 @@ class PlannedCamera(PlannedDevice):
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         """Accept settings that are offered."""
         self._offers.check(settings)
-        self._clock.spend(self._pace.change_s)
+        if settings != self._settings:
+            self._clock.spend(self._pace.change_s)
         self._settings = settings
         return settings
 
