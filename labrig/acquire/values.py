@@ -110,6 +110,9 @@ class CameraCapabilities:
         Width and height of a frame in pixels; None if they are not known before the first one.
     change_s
         Time in seconds by which a change of settings prolongs the time between two frames.
+    settling_s
+        Part of `overhead_s` from the half-pressed button until the shutter can be released, in
+        seconds; other devices may act meanwhile.
     """
 
     exposures_s: tuple[float, ...]
@@ -119,6 +122,7 @@ class CameraCapabilities:
     frame_bytes: int = 0
     frame_pixels: tuple[int, int] | None = None
     change_s: float = 0.0
+    settling_s: float = 0.0
 
     def exposure_near(self, exposure_s: float) -> float:
         """Return the offered exposure time nearest to `exposure_s`, such as 1/64 s for 1/60 s.

@@ -6,6 +6,7 @@ from collections.abc import Collection
 from labrig.acquire import CameraCapabilities, ExposureSettings, frame_bytes
 from labrig.foundation.errors import DeviceError
 
+from ..session import FIRST_BACK_OFF_S
 from ..settings import PtpCameraSettings
 from .codes import (
     BULB_TV,
@@ -82,6 +83,7 @@ class EosExposure:
             f_numbers=tuple(sorted(f_numbers)),
             overhead_s=self._settings.frame_time,
             change_s=self._settings.change_time,
+            settling_s=min(FIRST_BACK_OFF_S, self._settings.frame_time),
             frame_bytes=frame_bytes(self._settings.frame_size, self._settings.frame_pixels),
             frame_pixels=self._settings.frame_pixels,
         )

@@ -85,6 +85,8 @@ class PlannedCamera(PlannedDevice):
         self._offers = capabilities
         self._pace = pace or Pace(capabilities.overhead_s, capabilities.change_s)
         self._settings: ExposureSettings | None = None
+        #: Time at which the button was half-pressed; infinite where it is with the release.
+        self._armed_s = math.inf
 
     def capabilities(self) -> CameraCapabilities:
         """Return the settings that the driver declares."""
@@ -93,20 +95,22 @@ class PlannedCamera(PlannedDevice):
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         """Accept settings that are offered."""
         self._offers.check(settings)
-        if settings != self._settings:
-            self._clock.spend(self._pace.change_s)
+        self._clock.spend(self._pace.change_s)
         self._settings = settings
         return settings
 
     def arm(self) -> None:
-        """Do nothing."""
+        """Settle from now on."""
+        self._armed_s = self._clock.now()
 
     def shoot(self) -> Frame:
         """Let the time of an exposure and its transfer pass; return a frame without data."""
         assert self._settings is not None, "a session configures before it shoots"
         start_s = self._clock.now()
         end_s = start_s + self._settings.exposure_s
-        self._clock.spend(self._settings.exposure_s + self._pace.frame_time_s)
+        settled_s = min(start_s - self._armed_s, self._offers.settling_s)
+        self._armed_s = math.inf
+        self._clock.spend(self._settings.exposure_s + self._pace.frame_time_s - max(settled_s, 0.0))
         return Frame(b"", "", start_s, end_s, self._settings)
 
 
