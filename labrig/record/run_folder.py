@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -201,11 +202,6 @@ class RunFolder:
         self._journal = Journal(path / JOURNAL, disk)
         self._executor = ThreadPoolExecutor(1)
         self._files_due = False
-        self._files_bytes = sum(
-            files_bytes(doc[FILES])
-            for _, doc in (self._journal.read().documents if seed is not None else [])
-            if FILES in doc
-        )
 
     @classmethod
     def create(
@@ -293,6 +289,7 @@ class RunFolder:
         texts = {}
         if self._files_due or self._journal.size_bytes == 0:
             texts = {FILES: plan_texts(self.path)}
+        files_before = self._files_bytes
         writer = AttemptWriter(
             self._journal,
             unit,
@@ -305,8 +302,14 @@ class RunFolder:
             self._executor,
         )
         self._files_due = False
-        self._files_bytes += sum(map(files_bytes, texts.values()))
+        self._files_bytes = files_before + sum(map(files_bytes, texts.values()))
         return writer
+
+    @cached_property
+    def _files_bytes(self) -> int:
+        """Size of the run's files in the journal, on which uids do not depend."""
+        documents = [] if self._seed is None else self._journal.read().documents
+        return sum(files_bytes(doc[FILES]) for _, doc in documents if FILES in doc)
 
     def take_edits(self) -> None:
         """Write the files as they are now into the next RunStart, from which they hold."""

@@ -65,4 +65,4 @@ def test_what_is_still_to_be_measured_is_reported_before_anything_begins(
         if line.startswith("note: ") and "calibrate the bench" not in line
     ]
     assert len(notes) == (missing is not None)
-    assert all(f"rests on {missing}" in note and "--optics" in note for note in notes)
+    assert all(f"needs {missing}" in note and "--optics" in note for note in notes)

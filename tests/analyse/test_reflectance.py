@@ -15,6 +15,7 @@ from labrig.optics import Strip
 from labrig.protocols.reflectance.analysis import analyse
 from labrig.protocols.reflectance.result import ReflectanceResult
 from labrig.report import describe_phosphor, draw_phosphor
+from labrig.results import write_result
 from tests.acceptance.reflectance_pulls import (
     BLUE,
     JUDGED,
@@ -95,7 +96,7 @@ def test_the_result_is_read_back_and_makes_a_material(
     result: ReflectanceResult, tmp_path: Path
 ) -> None:
     assert_read_back(result)
-    result.write_files(tmp_path)
+    write_result(tmp_path, result)
     file = REFLECTANCE_KIND.read(tmp_path / "reflectance.yaml")
     assert file == result.calibration
     header, first, *_ = (tmp_path / "reflectance.csv").read_text().splitlines()

@@ -120,7 +120,7 @@ def test_it_tells_a_person_and_draws(labrig: Labrig, run: Path, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("options", "code", "said"),
     [
-        (["--white", "D66"], 2, "did you mean 'D65'?"),
+        (["--white", "D66"], 2, "did you mean 'D65'"),
         (["--normalise", "both"], 2, "expected 'all' or 'each'"),
         (["--material", "blue-pain"], 2, "did you mean 'blue-paint'?"),
         (["--material", "x=blue-paint"], 2, "no patch is called 'x'"),

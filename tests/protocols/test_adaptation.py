@@ -181,4 +181,5 @@ def test_a_chain_says_which_curves_it_lacks_and_what_a_calibration_would_save(
     curves = "optics:\n  lamp: halogen_3000k\n  grey_card: grey_card_18\n  filters: ./filters"
     rig = rig_file(("optics:", curves))
     notes = prepared(tmp_path, rig, "irradiance").notes()
-    assert not any("names no" in note and "under 'optics:'" in note for note in notes)
+    lacks = ("no spectrum of the lamp", "no reflectance of the grey card", "no colour filters")
+    assert not any(lack in note for note in notes for lack in lacks)

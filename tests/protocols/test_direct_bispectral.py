@@ -86,7 +86,7 @@ def test_a_spectrometer_that_is_unplugged_ends_the_run_and_it_is_resumed(
     content = read_quickly((folder / "rig.yaml").read_text())
     content["simulation"] |= {"faults": []}
     (folder / "rig.yaml").write_text(write_quickly(content))
-    assert labrig("resume", folder, "--yes", "--no-process").code == 0
+    assert labrig("resume", folder, "--edited", "--yes", "--no-process").code == 0
     # The samples lay in the white reference's place when the devices were connected again.
     result = process_run(folder)
     assert isinstance(result, DirectBispectralResult)

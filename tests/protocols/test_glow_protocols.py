@@ -141,7 +141,7 @@ def test_a_run_that_had_no_disk_left_goes_on_where_it_was(tmp_path: Path) -> Non
     content["simulation"] |= {"faults": []}
     content["simulation"]["initial"] |= {"manual_steps": ["lvf before camera"]}
     (folder / "rig.yaml").write_text(write_quickly(content))
-    assert guarded(["resume", str(folder), "--yes", "--no-process"]) == 0
+    assert guarded(["resume", str(folder), "--edited", "--yes", "--no-process"]) == 0
     after = read_run(folder).completed()
     assert tuple(after) == laid_out.units
     assert after["dark"].uid == before["dark"].uid

@@ -14,6 +14,7 @@ from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.optics import CURVES_FILE, CameraResponse, read_camera
 from labrig.protocols.camera_curves.analysis import analyse
 from labrig.protocols.camera_curves.result import CameraCurvesResult
+from labrig.results import write_result
 from tests.analyse.chart_bench import record, true_curves, with_camera
 from tests.analyse.recorded import part_of, processed_once
 from tests.analyse.small_runs import UNKNOWN_CAMERA, curves_protocol
@@ -99,7 +100,7 @@ def test_a_lens_that_the_rig_file_names_is_not_in_the_curves(
 
 
 def _written(result: CameraCurvesResult, folder: Path) -> Path:
-    result.write_files(folder)
+    write_result(folder, result)
     return folder / CURVES_FILE
 
 
