@@ -40,7 +40,9 @@ html_static_path = ["static"]
 html_css_files = ["labrig.css"]
 html_logo = html_favicon = "static/logo.svg"
 # Pages without further pages below them have no navigation of a section.
-html_sidebars: dict[str, list[str]] = {page: [] for page in ("tutorial", "glossary", "contributing")}
+html_sidebars: dict[str, list[str]] = {
+    page: [] for page in ("tutorial", "glossary", "contributing")
+}
 html_theme = "pydata_sphinx_theme"
 html_title = "labrig"
 html_show_sourcelink = False
