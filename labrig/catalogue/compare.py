@@ -12,6 +12,7 @@ from scipy.special import chdtrc
 from labrig.catalogue.comparable import not_comparable
 from labrig.foundation.detection import DETECTION_SIGMA
 from labrig.foundation.errors import DataError, DiskError, UsageError
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.foundation.result_warning import Disturbance, ResultWarning
 from labrig.foundation.yaml_file import did_you_mean
 from labrig.record import (
@@ -180,7 +181,7 @@ class PatchComparison:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(NotebookViews):
     """Comparison of two runs.
 
     Attributes
@@ -199,6 +200,19 @@ class Comparison:
     patches: tuple[PatchComparison, ...]
     missing: tuple[str, ...]
     temperatures_c: tuple[float | None, float | None]
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the differences of all patches as `differences.csv`."""
+        head = ("patch", "quantity", "unit", "a", "a_sigma", "b", "b_sigma", "difference (σ)")
+        rows = [
+            (
+                patch.patch, each.quantity, each.unit,
+                each.a.value, each.a.sigma, each.b.value, each.b.sigma, each.pull,
+            )
+            for patch in self.patches
+            for each in patch.differences
+        ]  # fmt: skip
+        return {"differences.csv": CsvTable(head, rows)}
 
     @property
     def warnings(self) -> tuple[ResultWarning, ...]:

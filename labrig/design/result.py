@@ -13,6 +13,7 @@ from labrig.design.glow import captures, emission
 from labrig.design.keys import Keys
 from labrig.design.light import LightProgramme, steps_to
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.material import REFERENCE_Y
 from labrig.optics import CIE_1931, delta_e, lab, observer, white_xyz
 
@@ -77,8 +78,12 @@ class Impossible:
         return f"{self.reason}; the nearest that is possible is {self.nearest}"
 
 
+#: Names and units of what each state has in each band.
+_OF_A_STATE = (("k_e of state", " (1/s)"), ("Λ of state", ""))
+
+
 @dataclass(frozen=True, eq=False)
-class Design:
+class Design(NotebookViews):
     """The material that best glows as wanted.
 
     Attributes
@@ -125,6 +130,18 @@ class Design:
     def n_states(self) -> int:
         """Number of states."""
         return len(self.k_r_per_s)
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the rates as `states.csv`, and what has a value in each band as `bands.csv`."""
+        numbers = range(1, self.n_states + 1)
+        head = [f"{name} {number}{unit}" for name, unit in _OF_A_STATE for number in numbers]
+        rows = zip(self.bands.names, *self.k_e_per_s, *self.reradiation, self.albedo, strict=True)
+        return {
+            "states.csv": CsvTable(
+                ("state", "k_r (1/s)"), list(zip(numbers, self.k_r_per_s, strict=True))
+            ),
+            "bands.csv": CsvTable(("band", *head, "albedo"), list(rows)),
+        }
 
     def radiance_at(self, place: ArrayLike, time_s: ArrayLike) -> FloatArray:
         """Return the radiance in the bands, reflected light included.

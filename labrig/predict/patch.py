@@ -1,7 +1,7 @@
 """Expected uncertainties of the fit of one patch."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,6 +56,13 @@ def chance_of_all_states(series: ExpectedSeries) -> float:
 SURE = 0.95
 
 
+#: Numbers of a state, each with its σ.
+STATE_HEAD = (
+    *("rate (1/s)", "rate_sigma (1/s)", "kinetic_order", "kinetic_order_sigma"),
+    *("amplitude (DN/s)", "amplitude_sigma (DN/s)"),
+)
+
+
 @dataclass(frozen=True)
 class PatchPrediction:
     """Expected uncertainties of a patch with m states, by descending rate.
@@ -96,6 +103,15 @@ class PatchPrediction:
     chance_of_all_states: float
     least_apart: float
     clipped: int
+
+    def states(self) -> Iterator[tuple[float, ...]]:
+        """Yield the numbers of each state, in the order of `STATE_HEAD`."""
+        yield from zip(
+            *(self.rate_per_s, self.rate_per_s_sigma),
+            *(self.kinetic_order, self.kinetic_order_sigma),
+            *(self.amplitude_dn_per_s, self.amplitude_dn_per_s_sigma),
+            strict=True,
+        )
 
     @property
     def resolves_all_states(self) -> bool:

@@ -9,10 +9,11 @@ from pydantic import ValidationError
 
 from labrig.acquire import Plan, ProtocolModel, RigFile, plan
 from labrig.foundation.errors import UsageError
+from labrig.foundation.notebook_views import CsvTable, NotebookViews
 from labrig.foundation.result_warning import ResultWarning
 from labrig.predict.assumptions import Sources, collect_assumptions
 from labrig.predict.expectation import Bench, expect, predictable
-from labrig.predict.patch import PatchPrediction, predicted_patches
+from labrig.predict.patch import STATE_HEAD, PatchPrediction, predicted_patches
 from labrig.predict.variants import Change, changed, changes
 
 #: Largest ratio of σ after over before a change that helps.
@@ -129,7 +130,7 @@ def _geometric_mean_ratio(after: Sequence[float], before: Sequence[float]) -> fl
 
 
 @dataclass(frozen=True)
-class Prediction:
+class Prediction(NotebookViews):
     """Expected uncertainties of a protocol's fits.
 
     Attributes
@@ -160,6 +161,22 @@ class Prediction:
     brightness_known: frozenset[str]
     notes: tuple[str, ...]
     warnings: tuple[ResultWarning, ...]
+
+    def csv_tables(self) -> dict[str, CsvTable]:
+        """Return the states of all patches as `states.csv`, and the changes as `changes.csv`."""
+        states = [
+            (name, number, *values)
+            for name, patch in self.patches.items()
+            for number, values in enumerate(patch.states(), start=1)
+        ]
+        changes = [
+            (remedy.change.description, remedy.gain, remedy.extra_time_s)
+            for remedy in self.remedies
+        ]
+        return {
+            "states.csv": CsvTable(("patch", "state", *STATE_HEAD), states),
+            "changes.csv": CsvTable(("change", "σ after over before", "extra time (s)"), changes),
+        }
 
     def to_json(self) -> str:
         """Return the prediction as JSON; infinite values are null."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from labrig.design import Design
 from labrig.fit import ChargeFit, MixtureFit
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.number_format import plus_minus, rounded
@@ -16,6 +17,7 @@ from labrig.record import RunDescription, RunRecord, time_text
 from labrig.report.charge import charge_report
 from labrig.report.chart import Chart, Line, Panel, logarithmic_axis
 from labrig.report.decay_figures import TIME_LABEL, linear_decay, logarithmic_decay
+from labrig.report.design import design_figure
 from labrig.report.figure_style import channel_colour
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.mixture import FittedMatrix, component_head, component_rows, components_text
@@ -67,8 +69,8 @@ def sections_of(result: Any) -> tuple[Section, ...]:
     Returns
     -------
     tuple of Section
-        Tables and figures, the most important first; of a type that is not known here the single
-        values and the first rows of its CSV tables.
+        Tables and figures, the most important first; of a type that is not known here the first
+        rows of its CSV tables, or the single values.
 
     Examples
     --------
@@ -78,7 +80,7 @@ def sections_of(result: Any) -> tuple[Section, ...]:
     >>> [table.head for table in sections_of(fit)[0].tables][0]
     ('', 'State 1', 'State 2')
     """
-    tables = (*_values(result), *_first_rows(result))
+    tables = tuple(_first_rows(result)) or tuple(_values(result))
     return (Section("Values", tables=tables),)
 
 
@@ -117,6 +119,13 @@ def _cell(value: Any) -> str:
 def _(result: ResultWithDecays) -> tuple[Section, ...]:
     sections, _ = measurement("decay").load("table_report")(result, _about(result.kind))
     return tuple(sections)
+
+
+@sections_of.register
+def _(design: Design) -> tuple[Section, ...]:
+    places = [f"place {number}" for number in range(1, int(design.keys.place.max()) + 2)]
+    glow = Picture("glow", partial(design_figure, design, places))
+    return (Section("Design", figures=(glow,), tables=tuple(_first_rows(design))),)
 
 
 @sections_of.register

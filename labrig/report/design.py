@@ -19,6 +19,7 @@ from labrig.results import with_uncertainty
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 #: Lines of keys, conflicts and wishes that are written one by one.
@@ -202,17 +203,22 @@ def draw_design(design: Design, places: Sequence[str], path: Path) -> None:
     >>> keys = Keys.checked(0, [11.0, 30.0], [[0.001, 0.01, 0.002], [0.0001, 0.001, 0.0002]])
     >>> draw_design(solve(light, keys, three_bands(), albedo=0.5), ["patch"], Path("glow.svg"))
     """
+    require_picture(path)
+    with figure_style():
+        save_picture(design_figure(design, places), path)
+
+
+def design_figure(design: Design, places: Sequence[str]) -> "Figure":
+    """Return the figure of `draw_design`, within `figure_style`."""
     from matplotlib.figure import Figure
 
-    require_picture(path)
     numbers = sorted(set(design.keys.place.tolist()))
-    with figure_style():
-        figure = Figure(figsize=(7.5, 3.2 * len(numbers)), layout="constrained")
-        rows = figure.subplots(2 * len(numbers), 1, height_ratios=[4, 1.2] * len(numbers))
-        for row, number in enumerate(numbers):
-            draw_curve(rows[2 * row], design, number, places[number])
-            draw_patches(rows[2 * row + 1], design, number)
-        save_picture(figure, path)
+    figure = Figure(figsize=(7.5, 3.2 * len(numbers)), layout="constrained")
+    rows = figure.subplots(2 * len(numbers), 1, height_ratios=[4, 1.2] * len(numbers))
+    for row, number in enumerate(numbers):
+        draw_curve(rows[2 * row], design, number, places[number])
+        draw_patches(rows[2 * row + 1], design, number)
+    return figure
 
 
 def time_text(t_s: float) -> str:

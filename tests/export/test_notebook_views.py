@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 import labrig
+from labrig.catalogue import Comparison
+from labrig.design import Design, Keys, LightProgramme, solve, three_bands
 from labrig.foundation.errors import UsageError
 from labrig.foundation.notebook_views import NotebookViews
 from labrig.foundation.plugins import measurements
+from labrig.predict import Prediction
 from labrig.results import FittedExcitation, LuminanceDecay, SharedDecay, TrapDepth
 from tests.export.conftest import Finished
 
@@ -33,6 +36,7 @@ def test_every_type_of_result_has_the_views() -> None:
     types = [registered.load("result") for _, registered in measurements()]
     types += [labrig.FittedDecay, labrig.Series, labrig.Material, labrig.RunRecord]
     types += [FittedExcitation, LuminanceDecay, SharedDecay, TrapDepth]
+    types += [Comparison, Design, Prediction]
     assert [each for each in types if not issubclass(each, NotebookViews)] == []
 
 
@@ -51,6 +55,16 @@ def test_a_page_has_the_numbers_of_the_report_and_a_style_of_its_own(finished: F
         assert 'href="#' not in page
         (style,) = re.findall(r"<style>(.*?)</style>", page, re.DOTALL)
         assert re.match(r"\s*\.labrig-result \{.*\}\s*$", style, re.DOTALL)
+
+
+def test_a_design_has_its_bands_and_its_glow() -> None:
+    light = LightProgramme.checked([0.0, 10.0], [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]])
+    wanted = Keys.checked(0, [11.0, 30.0], [[0.001, 0.01, 0.002], [0.0001, 0.001, 0.0002]])
+    design = solve(light, wanted, three_bands())
+    bands = design.to_pandas("bands")
+    assert bands["band"].tolist() == ["R", "G", "B"]
+    np.testing.assert_allclose(bands["Λ of state 1"], design.reradiation[0])
+    assert "Λ of state 1" in design._repr_html_()
 
 
 @pytest.mark.drawn
