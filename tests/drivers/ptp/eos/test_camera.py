@@ -52,6 +52,7 @@ def test_offers_what_the_camera_lists_and_the_rig_allows() -> None:
         isos=(200, 6400),
         f_numbers=(4.0, 5.6),
         overhead_s=3.0,
+        settling_s=0.02,
         frame_bytes=25_000_000,
     )
 

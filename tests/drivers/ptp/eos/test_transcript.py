@@ -104,7 +104,12 @@ def test_from_plug_to_leave(frame: bytes, empty_packets: bool) -> None:
     assert camera.identity() == "Canon EOS X, serial 123, firmware 2.1.2"
 
     assert camera.capabilities() == CameraCapabilities(
-        (1 / 128, 1 / 64), (100, 200), (4.0, 5.6), overhead_s=2.0, frame_bytes=30_000_000
+        (1 / 128, 1 / 64),
+        (100, 200),
+        (4.0, 5.6),
+        overhead_s=2.0,
+        settling_s=0.02,
+        frame_bytes=30_000_000,
     )
     assert camera.configure(ExposureSettings(1 / 60, 100, 4.0)) == ExposureSettings(
         1 / 64, 100, 4.0
