@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from labrig.cli.detachable_stream import DetachableStream
-from labrig.cli.screen import laid_out, terminal_width
+from labrig.cli.screen import note
 from labrig.cli.under_way import showing_work
 from labrig.foundation.activity import checking
 from labrig.foundation.clock import Interrupted
@@ -172,8 +172,5 @@ def _print_shortage(error: Exception) -> int:
 
 
 def _print_error(text: str, code: int) -> int:
-    line = f"labrig: {' '.join(text.split())}"
-    width = terminal_width(sys.stderr)
-    laid = [line] if width is None else laid_out(line, width)
-    print("\n".join(laid), file=DetachableStream(sys.stderr), flush=True)
+    note(f"labrig: {' '.join(text.split())}")
     return code

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labrig.cli.completion import complete_rig
+from labrig.cli.screen import echo
 from labrig.foundation.activity import activity
 from labrig.foundation.errors import DeviceError, LabrigError, UsageError
 
@@ -136,7 +137,7 @@ def _tell_next(file: Path, made: "NewRig") -> None:
     place = file if file.is_absolute() else f"./{file}"
     typer.echo(f"{file} is written, and yours to change")
     for line in made.unmeasured():
-        typer.echo(line)
+        echo(line)
     rig = read_rig_file(file)
     try:
         with activity("planning a decay"):
@@ -144,7 +145,7 @@ def _tell_next(file: Path, made: "NewRig") -> None:
             adapted, _ = decay.adapted_to(planned_rig(rig, str(file)), chosen=())
             plan(adapted, rig, str(file))
     except LabrigError as error:
-        typer.echo(f"! a decay cannot run on it yet: {error}")
+        echo(f"! a decay cannot run on it yet: {error}")
     else:
         typer.echo(f"a decay: labrig plan decay --rig {place}, then labrig run")
     typer.echo(f"after a change: labrig rig check {place}")
@@ -158,7 +159,7 @@ class Terminal:
 
     def tell(self, text: str) -> None:
         """Print a text."""
-        typer.echo(text)
+        echo(text)
 
     def ask(self, question: str, default: str) -> str:
         """Return a line; the default if it is empty."""

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from labrig.cli.screen import note
 from labrig.consent import has_consent, starting
 from labrig.foundation.clock import Interrupted
 from labrig.foundation.errors import LabrigError
@@ -42,11 +43,10 @@ def permitted(
         return on_finish
     if is_asked_for or has_consent(starting(on_finish)):
         return on_finish
-    print(
+    note(
         f"note: 'on_finish' in {path} will not be obeyed, in case somebody else wrote it: it "
         f"{starting(on_finish)}; add --on-finish for this run, or consent for all: "
-        "labrig rig use FILE",
-        file=sys.stderr,
+        "labrig rig use FILE"
     )
     return None
 

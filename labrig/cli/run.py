@@ -12,7 +12,7 @@ from labrig.cli.default_rig import RigOption, rig_path
 from labrig.cli.detachable_stream import DetachableStream
 from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.cli.protocol import protocol_path
-from labrig.cli.screen import echo
+from labrig.cli.screen import echo, note
 from labrig.cli.wording import EDITED
 from labrig.foundation.activity import activity
 from labrig.foundation.clock import Interrupted
@@ -177,9 +177,8 @@ def _prepared(protocol: str, rig: Path, runs: Path) -> "Recording":
     from labrig.bench import Recording
 
     recording = Recording.prepare(protocol_path(protocol), rig, runs)
-    for note in recording.notes():
-        # Nobody may read it: the run goes on.
-        print(f"note: {note}", file=DetachableStream(sys.stderr))
+    for line in recording.notes():
+        note(f"note: {line}")
     return recording
 
 

@@ -13,6 +13,7 @@ from typing import Any, TextIO
 
 import typer
 
+from labrig.cli.detachable_stream import DetachableStream
 from labrig.foundation.number_format import aligned
 
 #: Least width for which lines are laid out: a narrower terminal breaks them itself.
@@ -41,6 +42,13 @@ def echo(text: object = "", *, err: bool = False, **style: Any) -> None:
         lines = (part for line in str(text).split("\n") for part in laid_out(line, width))
         text = "\n".join(lines)
     typer.secho(text, err=err, **style)
+
+
+def note(line: str) -> None:
+    """Print a line on standard error; if nobody is there to read it, the run goes on."""
+    width = terminal_width(sys.stderr)
+    laid = [line] if width is None else laid_out(line, width)
+    print("\n".join(laid), file=DetachableStream(sys.stderr), flush=True)
 
 
 def echo_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

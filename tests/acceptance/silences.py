@@ -7,7 +7,7 @@ make the runs and files that later ones need. Printed are its duration, the long
 output, and the last line on the screen before that. A silence is wrong from 2 s on. Time in which
 the command waited for a processor that other programs had does not count. Wrong, too, is a line
 that is longer than the terminal is wide, unless a single word of it is: the terminal would break
-it within words and numbers.
+it within words and numbers. Only JSON and commands to be copied are as long as they are.
 """
 
 import argparse
@@ -197,7 +197,9 @@ def _too_wide(text: str, columns: int) -> list[str]:
     return [
         line
         for line in lines
-        if cell_len(line) > columns and max(map(cell_len, line.split())) + 4 <= columns / 2
+        if cell_len(line) > columns
+        and max(map(cell_len, line.split())) + 4 <= columns / 2
+        and not re.search(r'^ *"|pip install|: labrig ', line)
     ]
 
 
