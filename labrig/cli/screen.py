@@ -142,6 +142,6 @@ def terminal_width(stream: TextIO) -> int | None:
 
 def _cells(text: str) -> int:
     """Return how many cells of a terminal a text takes."""
-    from rich.cells import cell_len  # takes longer to load than most commands' other output
+    from rich.cells import cell_len  # slow to load; pipes need none of it
 
     return cell_len(text)
