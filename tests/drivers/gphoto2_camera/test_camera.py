@@ -99,12 +99,8 @@ def test_what_it_does_not_offer() -> None:
         assert not film.taken
 
 
-@pytest.mark.parametrize(
-    ("ready_s", "taken_s"), [(0.0, [1 / 64]), (0.1, [0.25, 1 / 64])], ids=["not ready", "exposing"]
-)
-def test_a_frame_that_was_broken_off_is_never_taken_for_the_next(
-    ready_s: float, taken_s: list[float]
-) -> None:
+@pytest.mark.parametrize("ready_s", [0.0, 0.1], ids=["not ready", "exposing"])
+def test_a_frame_that_was_broken_off_is_never_taken_for_the_next(ready_s: float) -> None:
     clock = SystemClock()
     with photographing(clock) as (camera, film):
         camera.configure(ExposureSettings(0.25, 100, 8.0))
@@ -116,7 +112,10 @@ def test_a_frame_that_was_broken_off_is_never_taken_for_the_next(
         camera.make_safe()
         camera.configure(SHORT)
         frame = camera.shoot()
-        assert [taken.exposure_s for taken in film.taken] == taken_s
+        # Whether the camera was ready in time depends on the load of the PC.
+        *broken_off, last = [taken.exposure_s for taken in film.taken]
+        assert last == 1 / 64
+        assert broken_off in ([], [0.25])
         assert digest(frame.data) == digest(film.delivered[-1])
 
 
