@@ -286,7 +286,7 @@ def _child(arguments: list[object], folder: Path, stop: Stop | None = None) -> E
     lines = said.read_text().splitlines()
     return Ending(
         os.waitstatus_to_exitcode(status),
-        [line for line in lines if not line.startswith("[")],
+        [line for line in lines if not line.startswith(("[", "note: "))],
         **json.loads(report.read_text()),
     )
 
