@@ -356,9 +356,10 @@ def _by_signal(grid: Grid) -> Axis | None:
     """Return what the rows are by the side of the diagonal that has the light."""
     rows, columns = grid.row_nm[:, np.newaxis], grid.column_nm
     is_clear = np.isfinite(grid.intensity)
-    for order in (1, 2, 3):
-        is_clear &= np.abs(rows - order * columns) > _BESIDE_NM
-        is_clear &= np.abs(columns - order * rows) > _BESIDE_NM
+    with np.errstate(over="ignore"):  # of a damaged file
+        for order in (1, 2, 3):
+            is_clear &= np.abs(rows - order * columns) > _BESIDE_NM
+            is_clear &= np.abs(columns - order * rows) > _BESIDE_NM
     in_rows = _mean(grid.intensity[is_clear & (rows > columns)])
     in_columns = _mean(grid.intensity[is_clear & (rows < columns)])
     if in_rows > _CLEAR * abs(in_columns):
