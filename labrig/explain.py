@@ -6,8 +6,8 @@ terminal and manual say the same.
 
 import ast
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Literal
@@ -44,7 +44,7 @@ class Explanation:
     text
         Meaning, in whole sentences.
     facts
-        Value and default of a key.
+        Value and default of a key, and the keys whose meaning refers to it.
     """
 
     kind: Literal["key", "warning", "term"]
@@ -91,7 +91,16 @@ def explain(name: str) -> list[Explanation]:
             f"expected a key of a file, the code of a warning or a term, got '{name}'; "
             f"{did_you_mean(name, names)}"
         )
-    return matches
+    depending = _depending(name.strip(), entries)
+    return [replace(each, facts=(*each.facts, *depending)) for each in matches]
+
+
+def _depending(name: str, entries: Sequence[Explanation]) -> list[tuple[str, str]]:
+    """Return the keys whose meaning refers to a key, as a fact; none where there are none."""
+    refers = re.compile(rf"`(?:\w+\.)*{re.escape(name)}(?:[:.=][^`]*)?`")
+    keys = [each.name for each in entries if each.kind == "key" and refers.search(each.text)]
+    others = sorted(set(keys) - {name})
+    return [("referred to by", ", ".join(others))] if others else []
 
 
 def _all() -> Iterator[Explanation]:

@@ -9,9 +9,16 @@ from labrig.foundation.errors import UsageError
 def test_a_key_has_value_default_and_meaning_in_every_file_that_has_it() -> None:
     places = {each.place: each for each in explain("every")}
     decay = places["protocol file, protocol: decay"]
-    assert dict(decay.facts) == {"value": "duration with unit", "default": "5 s"}
+    facts = {"value": "duration with unit", "default": "5 s", "referred to by": "for, until"}
+    assert dict(decay.facts) == facts
     assert "Time between the begins of two photographs" in decay.text
     assert "protocol file, protocol: blank" in places
+
+
+def test_a_key_names_those_that_depend_on_it() -> None:
+    (grows,) = {dict(each.facts)["referred to by"] for each in explain("exposure")}
+    assert grows == "grow_at_most"
+    assert all("referred to by" not in dict(each.facts) for each in explain("grow_at_most"))
 
 
 def test_a_code_has_its_kind_and_its_sentence() -> None:
