@@ -97,8 +97,7 @@ class Exposure:
             missing = "shutter time" if shutter is None else "ISO"
             raise DeviceError(
                 f"asked the camera for {requested}, and it does not offer this {missing}: choose "
-                "one of "
-                "those that 'labrig rig check' shows, or turn its dial to M"
+                "one of those that 'labrig rig check' shows, or turn its dial to M"
             )
         labels = {self._shutter: shutter, self._iso: sensitivity}
         if requested.f_number is not None:

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import shutil
 import sys
 from collections.abc import Sequence
 from datetime import datetime
@@ -15,7 +14,7 @@ from typer.core import TyperGroup
 from labrig.cli.completion import complete_protocol, complete_run
 from labrig.cli.inline_picture import InlinePictures
 from labrig.cli.runs_table import printable, progress_text, runs_csv, samples_table
-from labrig.cli.screen import echo, echo_table
+from labrig.cli.screen import echo, echo_table, terminal_width
 from labrig.cli.wording import counted, measurement
 from labrig.foundation.errors import UsageError
 from labrig.foundation.result_warning import warning_lines
@@ -303,7 +302,7 @@ def note(
 
 def _print_runs(summaries: Sequence["RunSummary"], *, thumbnails: bool) -> None:
     """Print the table of samples; whatever its width, every name can be copied."""
-    columns = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
+    columns = terminal_width(sys.stdout)
     pictures = InlinePictures.of_terminal() if thumbnails else None
     typer.echo(samples_table(summaries, columns, pictures))
 

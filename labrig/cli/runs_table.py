@@ -13,7 +13,7 @@ from labrig.cli.inline_picture import (
     ROWS as PICTURE_ROWS,
     InlinePictures,
 )
-from labrig.cli.screen import laid_out
+from labrig.cli.screen import cells, laid_out
 
 if TYPE_CHECKING:
     from labrig.catalogue import RunSummary
@@ -94,9 +94,7 @@ class _Layout:
 
     @classmethod
     def of(cls, runs: Sequence["RunSummary"], columns: int | None) -> Self:
-        from rich.cells import cell_len
-
-        name, status = (max(cell_len(text(run)) for run in runs) for text in (_name, _status))
+        name, status = (max(cells(text(run)) for run in runs) for text in (_name, _status))
         return cls(name, status, columns)
 
     def narrower(self, columns: int) -> Self:
@@ -104,8 +102,6 @@ class _Layout:
 
     def lines(self, runs: Sequence["RunSummary"]) -> Iterator[str]:
         """Yield the lines of a sample's runs, results beside the names or, if narrow, below."""
-        from rich.cells import cell_len
-
         before = self.name + self.status + 3 * len(_INDENT)
         if self.all is not None and self.all - before < MIN_RESULT_COLUMNS:
             yield from self._lines_below(runs, self.all)
@@ -114,8 +110,8 @@ class _Layout:
         for run in runs:
             name, status = _name(run), _status(run)
             head = (
-                f"{_INDENT}{name}{' ' * (self.name - cell_len(name))}{_INDENT}{_coloured(run)}"
-                f"{' ' * (self.status - cell_len(status))}{_INDENT}"
+                f"{_INDENT}{name}{' ' * (self.name - cells(name))}{_INDENT}{_coloured(run)}"
+                f"{' ' * (self.status - cells(status))}{_INDENT}"
             )
             first, *others = list(_results(run, result_columns)) or [""]
             yield f"{head}{first}".rstrip()

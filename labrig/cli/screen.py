@@ -60,8 +60,8 @@ def echo_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     width = terminal_width(sys.stdout)
     if width is not None:
         *columns, last = zip(head, *rows, strict=True)
-        begins = sum(max(map(_cells, column)) + 2 for column in columns)
-        needed = begins + min(max(map(_cells, last)), MIN_SENTENCE)
+        begins = sum(max(map(cells, column)) + 2 for column in columns)
+        needed = begins + min(max(map(cells, last)), MIN_SENTENCE)
         lines = _stacked(head, rows) if needed > width else _continued(lines, begins, width)
     echo("\n".join(lines))
 
@@ -94,25 +94,25 @@ def laid_out(line: str, width: int, hanging: int | None = None) -> Iterator[str]
     hanging
         Column at which further lines begin; without it, that of the second cell.
     """
-    if _cells(line) <= width or width < MIN_WIDTH:
+    if cells(line) <= width or width < MIN_WIDTH:
         yield line
         return
     first = _CELL.match(line)
     second = first and _CELL.match(line, first.end())
-    indent = _cells(first[1]) + 2 if first else 0
-    under_second = _cells(line[: second.start(2)]) if second else indent
+    indent = cells(first[1]) + 2 if first else 0
+    under_second = cells(line[: second.start(2)]) if second else indent
     if hanging is None:
         hanging = under_second if under_second <= width // 2 else indent
     margin = " " * hanging
     fold = partial(wrap, width=width, break_long_words=False, break_on_hyphens=False)
     laid = ""
     for gap, cell in _CELL.findall(line):
-        if _cells(laid + gap + cell) <= width:
+        if cells(laid + gap + cell) <= width:
             laid += gap + cell
             continue
         whole = _WITHIN_QUANTITY.sub("\N{NO-BREAK SPACE}", cell)
         begins = laid + gap + whole.split(" ", 1)[0]
-        is_for_next_line = _cells(margin + cell) <= width or _cells(begins) > width
+        is_for_next_line = cells(margin + cell) <= width or cells(begins) > width
         if laid.strip() and is_for_next_line:
             yield laid.rstrip()
             start, gap = margin, ""
@@ -140,8 +140,8 @@ def terminal_width(stream: TextIO) -> int | None:
         return None
 
 
-def _cells(text: str) -> int:
+def cells(text: str) -> int:
     """Return how many cells of a terminal a text takes."""
-    from rich.cells import cell_len  # slow to load; pipes need none of it
+    from rich.cells import cell_len  # slow to load
 
     return cell_len(text)

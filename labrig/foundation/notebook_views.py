@@ -54,7 +54,7 @@ class NotebookViews:
         UsageError
             There is no such figure, or nothing to draw.
         """
-        figure: Figure = _view("labrig.notebook:plot")(self, name)
+        figure: Figure = resolve_name("labrig.notebook:plot")(self, name)
         return figure
 
     def to_pandas(self, name: str = "") -> "DataFrame":
@@ -71,7 +71,7 @@ class NotebookViews:
         UsageError
             There is no such table, or pandas is not installed.
         """
-        frame: DataFrame = _view("labrig.export:frame_of")(self, name)
+        frame: DataFrame = resolve_name("labrig.export:frame_of")(self, name)
         return frame
 
     def to_xarray(self) -> "Dataset | DataTree":
@@ -82,14 +82,10 @@ class NotebookViews:
         UsageError
             xarray is not installed.
         """
-        data: Dataset | DataTree = _view("labrig.export:dataset_of")(self)
+        data: Dataset | DataTree = resolve_name("labrig.export:dataset_of")(self)
         return data
 
     def _repr_html_(self) -> str:
         """Return the page that a notebook shows."""
-        html: str = _view("labrig.notebook:html")(self)
+        html: str = resolve_name("labrig.notebook:html")(self)
         return html
-
-
-def _view(name: str) -> Any:
-    return resolve_name(name)

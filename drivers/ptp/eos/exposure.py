@@ -140,8 +140,7 @@ class EosExposure:
             dial = "B" if shutter is None and requested.exposure_s >= MIN_BULB_S else "M"
             raise DeviceError(
                 f"asked the camera for {requested}, and it does not offer this {missing}: choose "
-                "one of "
-                f"those that 'labrig rig check' shows, or turn its dial to {dial}"
+                f"one of those that 'labrig rig check' shows, or turn its dial to {dial}"
             )
         # a dial at B leaves no shutter time to be set
         codes = {} if self._dial_is_at_b else {Property.shutter_time: shutter}

@@ -97,8 +97,7 @@ class StandardExposure:
             missing = "shutter time" if units is None else "ISO"
             raise DeviceError(
                 f"asked the camera for {requested}, and it does not offer this {missing}: choose "
-                "one of "
-                "those that 'labrig rig check' shows, or set it to manual exposure"
+                "one of those that 'labrig rig check' shows, or set it to manual exposure"
             )
         self._set(StandardProperty.exposure_time, shutter, units, requested)
         if iso is not None:
