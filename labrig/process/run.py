@@ -438,18 +438,23 @@ def rendered_result(result: RunResult) -> Rendered:
     >>> [section.title for section in sections][:2]
     ['Results', 'Sample']
     """
+    source = _source_of(result)
+    if not result.run_part:
+        return _render(result, source)
+    chain: Any = source.protocol
+    link = next(link for link in chain.chain() if link.name == result.run_part)
+    return render(result, replace(source, run=source.run.part(link.name), protocol=link.protocol))
+
+
+def _source_of(result: RunResult) -> Source:
+    """Return what the report of a result needs of its run."""
     folder = _folder_of(result)
     overrides = Overrides(edited=result_takes_edits(folder))
     run, protocol = read_run(folder), overrides.protocol(folder)
     rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
     camera, _ = _camera_response(rig, None, Inputs.of(rig).updated_by(result)[LVF_KIND])
     about = describe_run(run, protocol, rig, edited=overrides.edited)
-    source = Source(run, protocol, rig, about, camera)
-    if not result.run_part:
-        return _render(result, source)
-    chain: Any = protocol
-    link = next(link for link in chain.chain() if link.name == result.run_part)
-    return render(result, replace(source, run=run.part(link.name), protocol=link.protocol))
+    return Source(run, protocol, rig, about, camera)
 
 
 def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, int]:
@@ -486,11 +491,11 @@ def draw_figures(folder: Path | str, path: Path | None = None) -> tuple[Path, in
     ('runs/decay/result/figures/figures.pdf', 8)
     """
     folder = Path(folder)
-    result, run = read_result(folder), read_run(folder)
+    result = read_result(folder)
+    source = _source_of(result)
     path = path or folder / "result" / "figures" / "figures.pdf"
-    protocol = Overrides(edited=result_takes_edits(folder)).protocol(folder)
-    title = f"{protocol.sample.name}, {run.name}"
-    n_pages = write_figures_pdf(path, title, rendered_result(result).sections)
+    title = f"{source.protocol.sample.name}, {source.run.name}"
+    n_pages = write_figures_pdf(path, title, _render(result, source).sections)
     if not n_pages:
         raise UsageError(f"{folder}: expected a report with figures, it has none")
     return path, n_pages
