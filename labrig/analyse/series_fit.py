@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import DECAY_DETECTION_SIGMA
-from labrig.foundation.errors import FitError
+from labrig.foundation.errors import FitError, FlickerUnknownError
 from labrig.results import AUTO, DecayReference, Series, TableClock
 
 #: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
@@ -42,7 +43,8 @@ def fit_series(
         channels or one each: 0 fixes it at zero, infinity leaves it free. None takes what the dark
         subtraction left uncertain in each channel.
     flicker
-        Relative scatter common to the channels of a frame; None measures it.
+        Relative scatter common to the channels of a frame; None measures it, or takes a
+        typical one where too few frames are bright to tell it.
     fixed_rates_per_s
         Rates in 1/s that take part and are held; they count as states.
     law
@@ -89,7 +91,8 @@ def fit_series(
         sigma = None
     if flicker is None and len(usable.t_s) < FRAMES_FOR_FLICKER:
         flicker = TYPICAL_FLICKER
-    fit = fit_decay(
+    fitted = partial(
+        fit_decay,
         usable.t_s,
         usable.values,
         sigma,
@@ -97,7 +100,6 @@ def fit_series(
         channels=usable.channels,
         n_states=states,
         offset_sigma=offset_sigma,
-        flicker=flicker,
         fixed_rates=fixed_rates_per_s,
         repeats=usable.unit,
         correlation=usable.correlation,
@@ -105,6 +107,11 @@ def fit_series(
         law=law,
         intervals=intervals,
     )
+    try:
+        fit = fitted(flicker=flicker)
+    except FlickerUnknownError:
+        # Of a fast decay that a frame or two show, nothing is left over that tells a flicker.
+        fit = fitted(flicker=TYPICAL_FLICKER)
     if not _is_seen(fit, float(usable.t_s.min())):
         raise FitError(
             "expected a decay, got nothing that stands out of the noise by "

@@ -76,6 +76,10 @@ class FitError(DataError):
     """Data that do not constrain the parameters of a fit."""
 
 
+class FlickerUnknownError(FitError):
+    """A decay whose bright frames are too few to tell their flicker besides its course."""
+
+
 class DiskError(LabrigError):
     """A disk that is full, too slow or gone."""
 

@@ -30,7 +30,7 @@ from labrig.fit.decay.series import NO_DECAY, DecaySeries, WhitenedSeries, white
 from labrig.fit.decay.variable_projection import projection
 from labrig.fit.nonlinear_least_squares import EPSILON
 from labrig.foundation.arrays import FloatArray
-from labrig.foundation.errors import FitError
+from labrig.foundation.errors import FitError, FlickerUnknownError
 from labrig.foundation.nonnegative import nonnegative_least_squares
 from labrig.material import exponential_means
 from labrig.results import ScatterSigma
@@ -249,7 +249,7 @@ def _flicker(
     along2 = np.einsum("fc,fc->f", u, residual) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
     free = np.maximum(1 - leverage, 0.0)
     if float(brightness2**2 @ free) <= MIN_SPARE * float(brightness2 @ brightness2):
-        raise FitError(
+        raise FlickerUnknownError(
             "expected frames to spare to estimate flicker, got a curve through all bright ones; "
             "give the flicker, or record more frames"
         )
