@@ -168,6 +168,23 @@ def test_fluorescence_is_not_found_where_there_is_none(quick_estimator: JointEst
     assert found == 0
 
 
+def test_light_of_a_faint_dye_that_no_photograph_shows_is_within_what_is_stated(
+    quick_estimator: JointEstimator,
+) -> None:
+    """Photographs that speak against any dye leave room for a faint one: never 0 ± 0."""
+    n_unseen = 0
+    for seed in range(6):
+        rng = np.random.default_rng(100 + seed)
+        true = surface(smooth_reflectance(rng), Dye(0.001, 450, 510))
+        fit = quick_estimator.fit("", *photographed(FEW, true, rng))
+        n_unseen += likely_number(fit) == 0
+        assert fit.surfaces is not None
+        light = (fit.surfaces.reradiation * fit.matrix.is_stokes).sum(axis=(1, 2))
+        assert light.std() > 0
+        assert abs(light.mean() - true.reradiation.sum()) < 3 * light.std()
+    assert n_unseen > 3
+
+
 def test_a_matrix_is_physical_and_known_with_sigma(green_fit: FluorescenceFit) -> None:
     matrix, surfaces = green_fit.matrix, green_fit.surfaces
     assert surfaces is not None

@@ -56,6 +56,9 @@ SCATTERED = 60
 #: Power of the evidence by which hypotheses with fluorophores are weighed. It rests on shapes that
 #: no dye has exactly, and would choose too surely among those that are about as good.
 TEMPER = 0.5
+#: Least part of the draws that have fluorophores: photographs that show none allow for faint ones,
+#: and the evidence against them rests on their prior's strength.
+UNSEEN_DYES = 0.03
 #: Part of the largest re-radiation that any entry may have beside all shapes: measured emissions
 #: have 1 to 2 % of their maximum far from it.
 UNSHAPED = 0.02
@@ -264,9 +267,12 @@ class JointEstimator:
     ) -> list[tuple[Hypothesis, Draws]]:
         kept: list[_Weighted] = []
         weight: list[float] = []
+        undyed = log_sum([w.log_posterior for w in weighted if not w.hypothesis.fluorophores])
         for has_dyes in (False, True):
             those = [each for each in weighted if bool(each.hypothesis.fluorophores) == has_dyes]
             whole = log_sum([each.log_posterior for each in those])
+            if has_dyes:
+                whole = max(whole, undyed + math.log(UNSEEN_DYES))
             tempered = [TEMPER * each.log_posterior for each in those]
             kept += those
             weight += [whole + each - log_sum(tempered) for each in tempered]
