@@ -208,10 +208,15 @@ CAMPAIGNS = {
         *(
             _module(
                 "interval_coverage",
-                *("--seeds", seeds, "--only", kind),
+                *("--seeds", "400", "--only", *only),
                 called=f"interval_coverage_{kind}",
             )
-            for kind, seeds in {"decay": "400", "charge": "400", "excitation": "400"}.items()
+            for kind, only in {
+                "decay": ("decay",),
+                "charge": ("charge",),
+                "excitation": ("excitation", "--case", "order"),
+                "excitation_faint": ("excitation", "--case", "a tenth"),
+            }.items()
         ),
         _module("sao_charge_and_decay"),
         _module("excitation_light"),

@@ -247,7 +247,7 @@ CASES = {
     ),
     "excitation": (
         excitation("order 1.5", 1.5, 4.0),
-        excitation("order 1.5, a tenth of the light", 1.5, 0.4),
+        excitation("a tenth of the light, order 1.5", 1.5, 0.4),
         excitation("order 1", 1.0, 4.0),
     ),
 }  # fmt: skip

@@ -18,7 +18,8 @@ AREAS: dict[str, tuple[str, ...]] = {
         *("whole_phosphor", "reused_calibration", "samples_in_turn", "excitation_rates"),
         *("excitation_light", "selected_lights", "leds_by_camera", "layer_range"),
         *("trap_models", "unequal_filling", "interval_coverage_charge"),
-        *("interval_coverage_excitation", "sao_charge_and_decay"),
+        *("interval_coverage_excitation", "interval_coverage_excitation_faint"),
+        "sao_charge_and_decay",
     ),
     "bench": (
         *("fade_pulls", "lvf_in_the_room", "sensor_noise", "gphoto2_latency"),

@@ -113,7 +113,8 @@ FIGURES = (
             "decay": "rates, orders and laws' parameters of decays at low signal, also where the "
             "noise is Student's t, or flicker is not told, or the truth is at a bound",
             "charge": "orders and rates of charge and decay, also near the bound of the order",
-            "excitation": "rates and orders of excitations",
+            "excitation": "rates and orders of excitations of order 1.5 and 1",
+            "excitation_faint": "rates and orders of an excitation by a tenth of the light",
         }.items()
     ),
     Figure(
