@@ -44,7 +44,7 @@ def fit_series(
         subtraction left uncertain in each channel.
     flicker
         Relative scatter common to the channels of a frame; None measures it, or takes a
-        typical one where too few frames are bright to tell it.
+        typical value where too few frames are bright to determine it.
     fixed_rates_per_s
         Rates in 1/s that take part and are held; they count as states.
     law
@@ -110,7 +110,7 @@ def fit_series(
     try:
         fit = fitted(flicker=flicker)
     except FlickerUnknownError:
-        # Of a fast decay that a frame or two show, nothing is left over that tells a flicker.
+        # A fast decay in a frame or two leaves no residuals from which flicker could be estimated.
         fit = fitted(flicker=TYPICAL_FLICKER)
     if not _is_seen(fit, float(usable.t_s.min())):
         raise FitError(

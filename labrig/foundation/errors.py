@@ -77,7 +77,7 @@ class FitError(DataError):
 
 
 class FlickerUnknownError(FitError):
-    """A decay whose bright frames are too few to tell their flicker besides its course."""
+    """A decay with too few bright frames to estimate their flicker beside its rates."""
 
 
 class DiskError(LabrigError):
