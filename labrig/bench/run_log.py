@@ -96,14 +96,17 @@ def logging_to(handler: logging.Handler, clock: Clock) -> Iterator[None]:
     True
     """
     handler.setFormatter(_Formatter(clock))
-    level = _LABRIG.level
+    level, propagate = _LABRIG.level, _LABRIG.propagate
     _LABRIG.setLevel(logging.DEBUG)
+    # A library that logs by `logging.debug` gives the root a handler that prints on the terminal.
+    _LABRIG.propagate = False
     _LABRIG.addHandler(handler)
     try:
         yield
     finally:
         _LABRIG.removeHandler(handler)
         _LABRIG.setLevel(level)
+        _LABRIG.propagate = propagate
         handler.close()
 
 

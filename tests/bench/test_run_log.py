@@ -1,5 +1,6 @@
 """The log of a run: in its folder, and at the terminal for who wants to see it."""
 
+import io
 import logging
 import re
 from collections.abc import Callable
@@ -8,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from labrig.bench import logging_to
+from labrig.foundation.clock import VirtualClock
 from labrig.record import read_run
 from tests.conftest import Ended
 
@@ -83,3 +86,17 @@ def test_a_log_that_cannot_be_written_stops_no_run(
     ended = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path, "--no-process")
     assert ended.code == 0, ended.err
     assert all(line.startswith("[") for line in ended.err.splitlines())
+
+
+def test_a_library_that_logs_to_the_terminal_does_not_bring_the_log_there() -> None:
+    terminal, kept = io.StringIO(), io.StringIO()
+    theirs = logging.StreamHandler(terminal)
+    logging.getLogger().addHandler(theirs)
+    try:
+        with logging_to(logging.StreamHandler(kept), VirtualClock()):
+            logging.getLogger("labrig.drivers.board").debug("relay off 0")
+        logging.getLogger("labrig.drivers.board").warning("after the run")
+    finally:
+        logging.getLogger().removeHandler(theirs)
+    assert "relay off 0" in kept.getvalue()
+    assert terminal.getvalue() == "after the run\n"

@@ -444,7 +444,8 @@ def test_obj_in_all_its_forms(tmp_path: Path) -> None:
     [("f 1 2 4", "4"), ("f 1 2 -4", "line 4"), ("f 1 2 0", "line 4"), ("f 1 2", "line 4"),
      ("f 1 2 x", "line 4"), ("v 1 2", "line 4"), ("v 1,5 2 3", "line 4"), ("v nan 0 0", "line 4"),
      ("f 1/1 2/1 3/1", "texture"), ("surf 0 1 0 1 1 2 3", "surf"), ("ff 1 2 3", "'ff'"),
-     ("l 1 2", "triangles"), ("f 1 1 2", "area"), ("f 1 2 3 \\", "\\")],
+     ("l 1 2", "triangles"), ("f 1 1 2", "area"), ("f 1 2 3 \\", "\\"),
+     (f"f {'1 2 3 ' * 4000}", "at most 10000 corners, got 12000 of line 4")],
 )  # fmt: skip
 def test_obj_that_is_not_read_is_refused(tmp_path: Path, line: str, says: str) -> None:
     (tmp_path / "a.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\n{line}\n")

@@ -14,6 +14,8 @@ IntArray = NDArray[np.int64]
 
 #: Parts of the square of a polygon's size below which an area is a rounding error.
 NO_AREA, CROSSED = 1e-12, 1e-6
+#: Polygons of more corners are in no mesh; to divide one takes the square of their number.
+MAX_POLYGON_CORNERS = 10_000
 
 
 def triangles(
@@ -43,12 +45,18 @@ def triangles(
     Raises
     ------
     UsageError
-        A polygon has fewer than three corners, or crosses itself.
+        A polygon has fewer than three corners or too many, or crosses itself.
     """
     if lengths.min(initial=3) < 3:
         number = int(np.argmin(lengths))
         raise UsageError(
             f"expected faces of three corners or more, got {lengths[number]} of {named(number)}"
+        )
+    if lengths.max(initial=3) > MAX_POLYGON_CORNERS:
+        number = int(np.argmax(lengths))
+        raise UsageError(
+            f"expected faces of at most {MAX_POLYGON_CORNERS} corners, got {lengths[number]} of "
+            f"{named(number)}; divide it into smaller faces"
         )
     first = np.cumsum(lengths) - lengths
     found = [np.empty((0, 3), np.int64)]
