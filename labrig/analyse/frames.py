@@ -13,7 +13,7 @@ import numpy as np
 from labrig.analyse.frame_times import LATE_S, switched_time, timed, untimed
 from labrig.analyse.inputs import AnalysisContext
 from labrig.analyse.overrides import Overrides
-from labrig.calibration import BlankFile, CameraFile
+from labrig.calibration import TYPICAL_FLICKER, BlankFile, CameraFile
 from labrig.foundation.errors import DataError, UsageError
 from labrig.foundation.input_file import MAX_FRAME_BYTES, read_bytes
 from labrig.foundation.region import Region, region_pixels
@@ -359,8 +359,6 @@ def _flag_frame(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> S
 
 #: Glare of a clean photographic lens, as a fraction of the frame's mean light.
 USUAL_GLARE = 0.01
-#: Flicker of a frame's light, common to all patches.
-FLICKER = 0.007
 #: Change of the course of a glow by the glare, in σ of all frames, and of its level, that matter.
 COURSE_SIGMAS, LEVEL = 2.0, 0.01
 
@@ -418,7 +416,7 @@ def _matters(series: Series, area: float, frame: Series) -> float:
         return 0.0
     signal, sigma = series.values[rows], series.sigma[rows]
     veil = USUAL_GLARE * (frame.values[rows] - area * signal)
-    weight = 1 / (np.square(sigma) + np.square(FLICKER * signal))
+    weight = 1 / (np.square(sigma) + np.square(TYPICAL_FLICKER * signal))
     power = (weight * np.square(signal)).sum(axis=0)
     # What is like the signal changes its level, the rest its course.
     levels = (weight * signal * veil).sum(axis=0) / power

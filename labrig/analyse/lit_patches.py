@@ -9,9 +9,8 @@ import numpy as np
 
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import AnalysisContext
-from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.bench_optics import LightSource
-from labrig.calibration import CAMERA_KIND
+from labrig.calibration import CAMERA_KIND, TYPICAL_FLICKER
 from labrig.fit.fluorescence import Exposure, FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL, SKEW_SIGMA, WIDTH_SIGMA
 from labrig.fit.spectrum import CurveError

@@ -8,15 +8,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from labrig.calibration import TYPICAL_FLICKER
 from labrig.fit import DecayFit, fit_decay
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.detection import DECAY_DETECTION_SIGMA
 from labrig.foundation.errors import FitError, FlickerUnknownError
 from labrig.results import AUTO, DecayReference, Series, TableClock
 
-#: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
+#: Fewest frames that determine their flicker.
 FRAMES_FOR_FLICKER = 6
-TYPICAL_FLICKER = 0.007
 
 
 def fit_series(

@@ -4,6 +4,7 @@ from .blank_file import (
 )
 from .camera_file import (
     CAMERA_KIND as CAMERA_KIND,
+    TYPICAL_FLICKER as TYPICAL_FLICKER,
     CameraFile as CameraFile,
     Linearity as Linearity,
     Noise as Noise,

@@ -10,6 +10,9 @@ from labrig.foundation.errors import DataError
 from labrig.foundation.models import Finite, FrozenModel, NotNegative, Positive
 from labrig.optics import CameraModel, f_number_text
 
+#: Flicker without a calibration: shutters, apertures and lamps scatter by 0.5 to 1 % (1 σ).
+TYPICAL_FLICKER = 0.007
+
 
 class Noise(FrozenModel):
     """Noise of a pixel at one ISO; every σ is one standard deviation.

@@ -15,6 +15,7 @@ from labrig.calibration import (
     CAMERA_KIND,
     FADE_KIND,
     IRRADIANCE_KIND,
+    TYPICAL_FLICKER,
     CalibrationKind,
     CameraFile,
     CardLight,
@@ -120,9 +121,8 @@ ANY_LUX = 1000.0
 FADE_STEPS, DARK = 12, 1e-3
 #: Edges of the steps in which the lamp's housing warms, in its time constants.
 WARMING_STEPS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
-#: Scatter of a photograph's light by shutter, aperture and lamp, and error of a shutter in s, where
-#: neither was calibrated (1 σ).
-FLICKER, SHUTTER_S = 0.007, 2e-4
+#: Error of a shutter in s that was not calibrated (1 σ).
+SHUTTER_S = 2e-4
 #: Names of what was photographed under the lamp.
 SAMPLE, CARD = "the sample", "the grey card"
 
@@ -331,7 +331,7 @@ class PhotographedRoom:
             if frame.path.name == lit.frame[best]
         )
         noise = float(np.max(np.nan_to_num(lit.sigma[best]) / lit.values[best]))
-        flicker = FLICKER if self.camera is None else self.camera.flicker
+        flicker = TYPICAL_FLICKER if self.camera is None else self.camera.flicker
         return ReflectedLight(
             SAMPLE,
             lit.values[best],

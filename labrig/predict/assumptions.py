@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 
 from labrig.acquire import CameraCapabilities, ProtocolModel
+from labrig.calibration import TYPICAL_FLICKER
 from labrig.foundation import resources
 from labrig.foundation.errors import UsageError
 from labrig.foundation.quantity import TIME_S, parse
@@ -15,7 +16,7 @@ from labrig.foundation.yaml_file import did_you_mean
 from labrig.material import Material, read_material
 from labrig.optics import CameraResponse
 from labrig.predict.expectation import Bench, expected_schedule, predictable
-from labrig.predict.frames import TYPICAL_FLICKER, CameraFigures, typical_camera
+from labrig.predict.frames import CameraFigures, typical_camera
 from labrig.predict.glow import Glow, check_states, laws, measured_amplitudes, radiated
 from labrig.predict.reference import Reference, read_reference, result_places, run_of
 from labrig.predict.variants import changed

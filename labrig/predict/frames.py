@@ -31,8 +31,6 @@ TYPICAL_DARK_ELECTRONS_PER_S = 0.1
 TYPICAL_PIXELS = 20e6
 #: Brightest over mean signal in a patch: vignetting, shading of the lamp, structure of the sample.
 TYPICAL_UNEVENNESS = 1.1
-#: Relative common-mode noise of a frame; shutters and apertures scatter by 0.5 to 1 %.
-TYPICAL_FLICKER = 0.007
 BAYER_FRACTIONS = {"R": 0.25, "G": 0.5, "B": 0.25}
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from labrig.analyse.frame_times import timing_warnings
 from labrig.analyse.frames import intact_frames, require_calibrated_camera, without_stray_light
 from labrig.analyse.inputs import AnalysisContext
-from labrig.analyse.series_fit import TYPICAL_FLICKER
-from labrig.calibration import BLANK_KIND, CAMERA_KIND
+from labrig.calibration import BLANK_KIND, CAMERA_KIND, TYPICAL_FLICKER
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning

@@ -188,7 +188,7 @@ CAMPAIGNS = {
         _module("camera_curves"),
         _module("reflectance_pulls", "--seeds", "4"),
         _module("luminance_budget"),
-        _module("law_confusion", "--seeds", "60"),
+        _module("law_confusion", "--seeds", "100"),
         _module("law_minima", "--seeds", "300"),
         _module("unequal_filling", "--seeds", "40"),
         *(

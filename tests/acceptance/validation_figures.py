@@ -96,7 +96,7 @@ FIGURES = (
     Figure(
         "Law of decay that the default protocol's fit takes, of two exponentials with rates 2.5, 5 "
         "and 20 apart, of general order 1.5, 2 and 3, and of one trap with retrapping of 0.1 and "
-        "0.5 (general order counts as right), signal-to-noise ratio about 300, 60 seeds each; and "
+        "0.5 (general order counts as right), signal-to-noise ratio about 250, 100 seeds each; and "
         "of Table 1 and of the shipped double exponentials, which are of first order",
         "law_confusion",
         figure.laws,

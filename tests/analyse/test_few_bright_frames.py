@@ -1,4 +1,4 @@
-"""A decay of which only two frames are bright: they tell its rate, and no flicker besides."""
+"""A decay of which only two frames are bright: they determine its rate, and no flicker besides."""
 
 import numpy as np
 import pytest
@@ -37,8 +37,8 @@ def glow(seed: int) -> Series:
     )
 
 
-def untold(seed: int) -> Series | None:
-    """Return the glow of a seed where its flicker is not to be told, else None."""
+def without_known_flicker(seed: int) -> Series | None:
+    """Return the glow of a seed if nothing determines its flicker, else None."""
     series = glow(seed)
     try:
         fit_decay(series.t_s, series.values, series.sigma, channels="RGB", flicker=None)
@@ -47,8 +47,8 @@ def untold(seed: int) -> Series | None:
     return None
 
 
-def test_typical_flicker_stands_in_for_one_that_nothing_tells() -> None:
-    glows = [series for seed in range(10) if (series := untold(seed)) is not None]
+def test_typical_flicker_is_taken_where_nothing_determines_it() -> None:
+    glows = [series for seed in range(10) if (series := without_known_flicker(seed)) is not None]
     assert glows
     for series in glows:
         (state,) = fit_series(series).states

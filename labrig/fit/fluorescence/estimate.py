@@ -267,12 +267,11 @@ class JointEstimator:
     ) -> list[tuple[Hypothesis, Draws]]:
         kept: list[_Weighted] = []
         weight: list[float] = []
-        undyed = log_sum([w.log_posterior for w in weighted if not w.hypothesis.fluorophores])
+        least = -math.inf
         for has_dyes in (False, True):
             those = [each for each in weighted if bool(each.hypothesis.fluorophores) == has_dyes]
-            whole = log_sum([each.log_posterior for each in those])
-            if has_dyes:
-                whole = max(whole, undyed + math.log(UNSEEN_DYES))
+            whole = max(log_sum([each.log_posterior for each in those]), least)
+            least = whole + math.log(UNSEEN_DYES)
             tempered = [TEMPER * each.log_posterior for each in those]
             kept += those
             weight += [whole + each - log_sum(tempered) for each in tempered]

@@ -14,7 +14,7 @@ IntArray = NDArray[np.int64]
 
 #: Parts of the square of a polygon's size below which an area is a rounding error.
 NO_AREA, CROSSED = 1e-12, 1e-6
-#: Polygons of more corners are in no mesh; to divide one takes the square of their number.
+#: Most corners of a polygon: the time to divide it grows with the square of their number.
 MAX_POLYGON_CORNERS = 10_000
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from labrig.analyse.frames import require_intact
 from labrig.analyse.inputs import AnalysisContext
-from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
+from labrig.analyse.series_fit import fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.surface import patch_reflectance, with_layer, with_reflectance
 from labrig.analyse.temperature import at_temperature
@@ -21,6 +21,7 @@ from labrig.calibration import (
     FADE_KIND,
     IRRADIANCE_KIND,
     REFLECTANCE_KIND,
+    TYPICAL_FLICKER,
     IrradianceFile,
     Warming,
 )

@@ -10,7 +10,15 @@ from labrig.analyse.frame_times import switched_time, timed, untimed
 from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import camera_curves, lamp_spectrum
-from labrig.calibration import CAMERA_KIND, LVF_KIND, CameraFile, Change, FadeFile, Warming
+from labrig.calibration import (
+    CAMERA_KIND,
+    LVF_KIND,
+    TYPICAL_FLICKER,
+    CameraFile,
+    Change,
+    FadeFile,
+    Warming,
+)
 from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
@@ -210,8 +218,6 @@ def _warming_of(
     return float(deficit), sigma, float(residual @ residual), float(warm_level)
 
 
-#: Relative flicker of a photograph without a camera file.
-TYPICAL_FLICKER = 0.007
 #: Step in nm of the wavelengths on which curves are integrated.
 STEP_NM = 10.0
 #: Times of the table in seconds, denser at first and the same in all runs, and the fraction of the

@@ -11,15 +11,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.calibration import CameraFile
+from labrig.calibration import TYPICAL_FLICKER, CameraFile
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
 from labrig.reduce import SeriesFrame, reduce_patches
 from labrig.results import Measured, Series
 
-#: Scatter of a frame's light by shutter, aperture and lamp, where it was not calibrated (1 σ).
-FLICKER = 0.007
 #: Error of a shutter in seconds, and of the ratio of two sensitivities, not calibrated (1 σ).
 SHUTTER_S, ISO_RATIO = 2e-4, 0.02
 #: Range of ln t about a change of ISO in which frames tell the ratio.
@@ -104,7 +102,7 @@ def glow_ratios(
         )
     lit = lit.take(np.flatnonzero(lit.usable))
     settings = float(lit.iso[0]), _f_number(lit)
-    flicker = FLICKER if camera is None else camera.flicker
+    flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     card_dn = lit.values.mean(axis=0)
     noise = np.sqrt(np.square(lit.sigma / lit.values).mean(axis=0)).min()
     parts = []
