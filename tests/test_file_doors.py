@@ -111,9 +111,12 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
     ("subprocess",): {
         "labrig/acquire/running_programs.py",  # ps
         "labrig/bench/awake.py",  # systemd-inhibit, caffeinate
-        "labrig/bench/guard.py",  # labrig itself
-        "labrig/reduce/workers/pool.py",  # labrig itself
-        "labrig/watch/previews.py",  # labrig itself
+        "labrig/foundation/own_process.py",  # labrig itself
+        # their streams and ends
+        "labrig/bench/guard.py",
+        "labrig/process/ahead.py",
+        "labrig/reduce/workers/pool.py",
+        "labrig/watch/previews.py",
         "labrig/cli/on_finish.py",  # by consent
         "labrig/reproduce/picture/video.py",  # ffmpeg
         "drivers/gphoto2_camera/process.py",  # labrig itself
@@ -169,6 +172,7 @@ IMPORTS: dict[tuple[str, ...], set[str]] = {
     ("tempfile",): {  # folders and files of their own, of random names
         "labrig/compare/rendered.py",
         "labrig/compare/rendered_lamps.py",
+        "labrig/process/run.py",
         "labrig/studio/workbench.py",
         "labrig/studio/scene_bench.py",
         "labrig/reproduce/picture/video.py",

@@ -10,7 +10,6 @@ same drivers and switches them off, after having killed a process that hangs. It
 import json
 import os
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, TimeoutError as TooSlow
@@ -19,6 +18,7 @@ from typing import IO, Any
 
 from labrig.acquire import LIGHTS, RigFile
 from labrig.foundation.errors import DeviceError
+from labrig.foundation.own_process import own_process
 from labrig.foundation.quantity import duration_text
 
 #: Messages to the guard: a light may be on, or all are off.
@@ -145,16 +145,13 @@ def _started(order: dict[str, Any]) -> "subprocess.Popen[bytes]":
         The process cannot be started, or does not get ready.
     """
     try:
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "labrig.bench.guard_process"],
+        process: subprocess.Popen[bytes] = own_process(
+            "labrig.bench.guard_process",
+            windows_flags="DETACHED_PROCESS",
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             bufsize=0,
-            # What ends the processes of a terminal does not end it.
-            start_new_session=os.name != "nt",
-            creationflags=getattr(subprocess, "DETACHED_PROCESS", 0)
-            | getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
     except OSError as error:
         raise _cannot_start(str(error)) from None

@@ -33,6 +33,7 @@ from labrig.foundation.yaml_file import read_yaml, yaml_text
 from labrig.record import (
     CALIBRATIONS_FILE,
     JOURNAL,
+    Begun,
     RunFolder,
     RunSize,
     lost_files,
@@ -55,6 +56,10 @@ _CURVES = {
         "curves): {parts} asks for the shipped ones, which are invented; name yours before the run"
     ),
 }
+
+
+def _unnoticed(folder: Path, size: RunSize) -> None:
+    """Receive a run that begins, as somebody who has nothing to do then."""
 
 
 @dataclass(frozen=True)
@@ -157,15 +162,15 @@ class Recording:
             *self.protocol.notes(self.rig),
         )
 
-    def record(self, watch: Watch, created: Callable[[Path], None] = lambda folder: None) -> Path:
+    def record(self, watch: Watch, begun: Begun = _unnoticed) -> Path:
         """Create a run folder, record into it and return its path.
 
         Parameters
         ----------
         watch
             Observer of the run.
-        created
-            Called with the path of the run folder before anything happens.
+        begun
+            Called before anything happens with the run folder and the size of what is to come.
 
         Raises
         ------
@@ -188,7 +193,7 @@ class Recording:
                 bench.disk,
             )
             try:
-                created(folder.path)
+                begun(folder.path, self.plan.size())
                 with folder, run_log(folder.path, self.rig.name, bench.clock):
                     execute(folder, self.protocol, bench, self.plan, watch)
             except BaseException:
@@ -214,6 +219,7 @@ def resume_run(
     confirm: Callable[[str], bool] = _refuse,
     *,
     edited: bool = False,
+    begun: Begun = _unnoticed,
 ) -> Path:
     """Complete a run: units that were not finished are done, again if need be.
 
@@ -228,6 +234,8 @@ def resume_run(
     edited
         Whether protocol and rig are taken as their files were edited since, and written into the
         journal; else they are those of the journal.
+    begun
+        Called before anything happens with the run folder and the size of what is missing.
 
     Returns
     -------
@@ -257,7 +265,8 @@ def resume_run(
         record = read_run(path)
         last_time, done = record.last_time, frozenset(record.completed())
     run_plan = _planned(protocol, path / "protocol.yaml", rig, path / "rig.yaml")
-    _require_free_disk(path, run_plan.size(done))
+    size = run_plan.size(done)
+    _require_free_disk(path, size)
     with (
         open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as bench,
         RunFolder(path, bench.seed, bench.disk) as folder,
@@ -266,6 +275,7 @@ def resume_run(
         _confirm_losses(folder, confirm)
         if edited:
             folder.take_edits()
+        begun(path, size)
         execute(folder, protocol, bench, run_plan, watch)
     return path
 

@@ -69,6 +69,7 @@ def run(
     with activity("preparing the run"):
         from labrig.cli.on_finish import notify_at_end, permitted
         from labrig.cli.progress import progress
+        from labrig.process import reduced_ahead
 
         path = rig_path(rig)
         recording = _prepared(protocol, path, runs)
@@ -76,7 +77,8 @@ def run(
     with notify_at_end(at_end) as ending:
         has_changer = "changer" in recording.rig.devices
         watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
-        folder = recording.record(watch)
+        with reduced_ahead(wanted=not no_process) as begun:
+            folder = recording.record(watch, begun)
         _finish(folder, no_process, json)
         ending.message = str(folder)
 
@@ -147,6 +149,7 @@ def resume(
         from labrig.cli.on_finish import notify_at_end, permitted
         from labrig.cli.process import print_edits
         from labrig.cli.progress import progress
+        from labrig.process import reduced_ahead
 
         folder = find_run(run, runs)
         is_processed = summarise(folder).status == "processed"
@@ -157,7 +160,8 @@ def resume(
     watch = partial(progress, yes=yes, has_changer=has_changer, verbose=verbose)
     at_end = permitted(None if rig is None else rig.on_finish, path, is_asked_for=on_finish)
     with notify_at_end(at_end) as ending:
-        resume_run(folder, watch, partial(_confirmed, yes=yes), edited=edited)
+        with reduced_ahead(wanted=not no_process) as begun:
+            resume_run(folder, watch, partial(_confirmed, yes=yes), edited=edited, begun=begun)
         if is_processed:
             _print_processed(folder, json)
         else:

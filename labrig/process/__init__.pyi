@@ -1,3 +1,6 @@
+from .ahead import (
+    reduced_ahead as reduced_ahead,
+)
 from .comparison import show_comparison as show_comparison
 from .result_changes import other_settings as other_settings
 from .run import (

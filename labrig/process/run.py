@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from labrig.acquire import (
@@ -289,28 +290,10 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     """Process a run that no other process processes meanwhile."""
     check_options(overrides.options, protocol)
     require_as_sealed(folder)
-    run = read_run(folder)
-    rig = with_shipped_camera(overrides.bench(folder), run.camera_identity)
-    frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
-    overrides.check([file for attempt in run.completed().values() for file in attempt.files])
-    require_recorded_settings(run, overrides.bench(folder), overrides)
-    part, result, camera = _analysed(run, protocol, rig, overrides)
-
-    about = describe_run(run, protocol, rig, edited=overrides.edited)
+    analysed = _analysed_frames(read_run(folder), protocol, overrides)
+    part, result, _ = analysed
     result_folder = new_result(folder)
-    write_provenance(
-        result_folder, provenance(run, protocol, overrides, camera.name if camera else None)
-    )
-    write_result(result_folder, result)
-    write_nexus(result_folder / "run.nxs", run, about, result)
-    shown = [sorted(run.frames(role), key=_dimness) for role in protocol.picture_frames]
-    if (picture := sample_picture([*chain.from_iterable(shown)], camera)) is not None:
-        write_durably(result_folder / SAMPLE_PICTURE, picture)
-    rendered = _render(result, Source(run, protocol, rig, about, camera))
-    warning_texts = warning_lines(result.warnings, "warning: ")
-    write_summary(result_folder, [*rendered.lines, *warning_texts])
-    report = Report(about, result.warnings, rendered.sections, rendered.methods, frames, camera)
-    write_report(result_folder / "report.html", report)
+    rendered = _write(result_folder, *analysed)
     include_comparison(folder, result_folder)
     not_kept = tuple(overrides.not_kept(given_before(folder)))
     changes = put_in_place(result_folder)
@@ -320,6 +303,63 @@ def _process(folder: Path, overrides: Overrides, protocol: ProtocolModel) -> Pro
     if failures := result.failures():
         raise FitError(f"{'; '.join(failures)}; the run is kept, see {page}")
     return Processed(result.of_run(folder), page, rendered.lines, changes, not_kept)
+
+
+def process_so_far(folder: Path) -> None:
+    """Process a run that is being recorded, for what is kept of its frames; write no result.
+
+    Parameters
+    ----------
+    folder
+        Run folder.
+
+    Raises
+    ------
+    LabrigError
+        There is too little yet for a result; all frames reduced before that are kept.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.process.run import process_so_far
+    >>> process_so_far(Path("runs/decay"))
+    """
+    overrides = Overrides()
+    analysed = _analysed_frames(read_run(folder).so_far(), overrides.protocol(folder), overrides)
+    with TemporaryDirectory(prefix="labrig-") as discarded:
+        _write(Path(discarded), *analysed)
+
+
+def _analysed_frames(
+    run: RunRecord, protocol: ProtocolModel, overrides: Overrides
+) -> tuple[AnalysisContext, RunResult, CameraResponse | None]:
+    """Analyse a run whose frames have the settings that its journal says."""
+    bench = overrides.bench(run.folder)
+    overrides.check([file for attempt in run.completed().values() for file in attempt.files])
+    require_recorded_settings(run, bench, overrides)
+    rig = with_shipped_camera(bench, run.camera_identity)
+    return _analysed(run, protocol, rig, overrides)
+
+
+def _write(
+    folder: Path, part: AnalysisContext, result: RunResult, camera: CameraResponse | None
+) -> Rendered:
+    """Write result, exports and report of a run into a folder, and return what was rendered."""
+    run, protocol, rig, overrides = part.run, part.protocol, part.rig, part.overrides
+    about = describe_run(run, protocol, rig, edited=overrides.edited)
+    write_provenance(folder, provenance(run, protocol, overrides, camera.name if camera else None))
+    write_result(folder, result)
+    write_nexus(folder / "run.nxs", run, about, result)
+    shown = [sorted(run.frames(role), key=_dimness) for role in protocol.picture_frames]
+    if (picture := sample_picture([*chain.from_iterable(shown)], camera)) is not None:
+        write_durably(folder / SAMPLE_PICTURE, picture)
+    rendered = _render(result, Source(run, protocol, rig, about, camera))
+    warning_texts = warning_lines(result.warnings, "warning: ")
+    write_summary(folder, [*rendered.lines, *warning_texts])
+    frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
+    report = Report(about, result.warnings, rendered.sections, rendered.methods, frames, camera)
+    write_report(folder / "report.html", report)
+    return rendered
 
 
 def _dimness(frame: FrameRecord) -> tuple[bool, float]:

@@ -13,9 +13,10 @@ from labrig.catalogue import summarise
 from labrig.foundation.activity import activity
 from labrig.foundation.errors import DataError, LabrigError, UsageError
 from labrig.foundation.file_lock import plain_lock
-from labrig.process import process_and_report
+from labrig.process import process_and_report, reduced_ahead
 from labrig.queue.queue_file import Queue, QueuedRun, change_queue, read_queue
 from labrig.queue.results import QueueEntry, entries, write_results
+from labrig.record import RunSize
 
 #: Status of a run that needs nothing more.
 COMPLETE = "processed"
@@ -114,12 +115,17 @@ def _recorded(path: Path, runs: Path, entry: QueueEntry, before: str, attendant:
         is_brought = sample is None or sample in _on_changer(recording)
         if before and sample is not None and sample != before and not is_brought:
             attendant.change_sample(before, sample)
-        return recording.record(
-            attendant.watch(recording.rig), lambda folder: _note(path, entry, folder.name)
-        )
+        with reduced_ahead() as begun:
+
+            def noted(folder: Path, size: RunSize) -> None:
+                _note(path, entry, folder.name)
+                begun(folder, size)
+
+            return recording.record(attendant.watch(recording.rig), noted)
     folder = entry.summary.folder
     if summarise(folder).status != "recorded":
-        resume_run(folder, attendant.watch(read_run_rig(folder)))
+        with reduced_ahead() as begun:
+            resume_run(folder, attendant.watch(read_run_rig(folder)), begun=begun)
     return folder
 
 

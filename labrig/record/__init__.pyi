@@ -57,6 +57,7 @@ from .plan_files import (
 from .run_folder import (
     CALIBRATIONS_FILE as CALIBRATIONS_FILE,
     RECORDING_LOCK as RECORDING_LOCK,
+    Begun as Begun,
     RunFolder as RunFolder,
     RunLock as RunLock,
     RunSize as RunSize,

@@ -525,6 +525,10 @@ class RunSize:
         )
 
 
+#: Receives the folder of a run that begins, and the size of what is to be recorded into it.
+Begun = Callable[[Path, RunSize], None]
+
+
 def size_text(size_bytes: float) -> str:
     """Format a size.
 

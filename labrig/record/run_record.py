@@ -156,6 +156,13 @@ class RunRecord(NotebookViews):
         """Return a text of the first RunStart, such as `protocol`; empty if there is none."""
         return str(self.attempts[0].start.get(key, "")) if self.attempts else ""
 
+    def so_far(self) -> "RunRecord":
+        """Return the record as if the attempt that is under way were complete."""
+        *ended, last = self.attempts
+        if last.exit_status is None:
+            last = replace(last, exit_status="success")
+        return replace(self, attempts=[*ended, last])
+
     def completed(self) -> dict[str, Attempt]:
         """Return the completed attempt of each unit by the unit's name, in order of completion.
 

@@ -97,6 +97,7 @@ from .strip import (
     strip_profile_in as strip_profile_in,
 )
 from .workers.pool import (
+    WORTHWHILE_BYTES as WORTHWHILE_BYTES,
     Reduction as Reduction,
 )
 from .workers.reduction import (

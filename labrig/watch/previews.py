@@ -1,19 +1,19 @@
 """Previews of frames in a process of their own, so that the process of the rig keeps its timing."""
 
 import json
-import os
-import subprocess
 import sys
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from subprocess import DEVNULL, PIPE, Popen
 from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.foundation.errors import LabrigError
+from labrig.foundation.own_process import own_process
 
 
 @dataclass(frozen=True)
@@ -54,17 +54,14 @@ class Previews:
 
     def __init__(self, run: Path, width: int) -> None:
         self.latest: RenderedPreview | None = None
-        # -P: nothing that lies in the working folder is taken for a module.
-        # Ctrl-C on a terminal goes to the whole group: this process ends in `close` only.
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "labrig.watch.previews", str(run), str(width)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
+        self._process: Popen[str] = own_process(
+            "labrig.watch.previews",
+            *(str(run), str(width)),
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=DEVNULL,
             text=True,
             encoding="utf-8",
-            start_new_session=os.name != "nt",
-            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

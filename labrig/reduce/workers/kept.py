@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
+from labrig.foundation.clock import SystemClock
 from labrig.foundation.errors import DiskError, LabrigError
 from labrig.foundation.input_file import read_bytes, read_text
 from labrig.foundation.output_file import make_folder_in, write_text
@@ -90,8 +91,10 @@ def _array_or_object(content: dict[str, Any]) -> Any:
     return array.reshape(content["shape"]).copy()
 
 
-#: Frames after which what is new is written, so that little is lost if the process is killed.
-_WRITE_EVERY = 100
+#: Time in seconds after which what is new is written, so that little is lost if the process is
+#: killed.
+_WRITE_EVERY_S = 10.0
+_CLOCK = SystemClock()
 #: Largest file of them that is read, of some 10,000 frames of many patches.
 MAX_CACHE_BYTES = 200_000_000
 #: Libraries whose version changes what is reduced from a frame.
@@ -123,7 +126,7 @@ class ReductionCache:
         self._path = run / CACHE / f"{self._name}-{arguments[:16]}-{self._ending}"
         self._identity = f"{arguments} {code}"
         self._texts = self._read()
-        self._new = 0
+        self._is_changed, self._written_s = False, _CLOCK.now()
 
     def get(self, key: str) -> str | None:
         """Return what was kept under a key; None if nothing was."""
@@ -132,13 +135,13 @@ class ReductionCache:
     def add(self, key: str, text: str) -> None:
         """Keep a line of text under a key."""
         self._texts[key] = text
-        self._new += 1
-        if self._new >= _WRITE_EVERY:
+        self._is_changed = True
+        if _CLOCK.now() - self._written_s >= _WRITE_EVERY_S:
             self.write()
 
     def write(self) -> None:
         """Write what is new, as far as the disk allows: nothing depends on it."""
-        if not self._new:
+        if not self._is_changed:
             return
         content = "".join(f"{key} {text}\n" for key, text in self._texts.items())
         head = f"{self._identity} {own_digest(content.encode())}\n"
@@ -148,7 +151,7 @@ class ReductionCache:
             for path in self._path.parent.glob(f"{self._name}-*.jsonl"):
                 if not path.name.endswith(self._ending):
                     path.unlink()
-        self._new = 0
+        self._is_changed, self._written_s = False, _CLOCK.now()
 
     def _read(self) -> dict[str, str]:
         """Return the texts by key; none if the file is missing or damaged."""

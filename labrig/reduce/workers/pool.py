@@ -7,16 +7,17 @@ that a script or a notebook needs no precautions, on any system.
 
 import os
 import pickle
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
+from subprocess import PIPE, Popen
 from typing import IO, Any, Protocol, TypeVar
 
 from labrig.foundation.errors import DataError
+from labrig.foundation.own_process import own_process
 from labrig.foundation.processors import n_processors
 from labrig.foundation.signals import name_of
 from labrig.reduce.raw import RawFrame, read_raw
@@ -144,14 +145,11 @@ class _Worker:
     """A process that applies one reduction, one group of frames at a time."""
 
     def __init__(self, reduction: Reduction[Any]) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "labrig.reduce.workers.process"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
+        self._process: Popen[bytes] = own_process(
+            "labrig.reduce.workers.process",
+            stdin=PIPE,
+            stdout=PIPE,
             env={**os.environ, "PYTHONPATH": _import_path()},
-            # Ctrl-C is for the process that asks.
-            start_new_session=os.name != "nt",
-            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

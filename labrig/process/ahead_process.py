@@ -1,0 +1,72 @@
+"""The process of `ahead`: processes a run again and again while it is recorded.
+
+    python -P -m labrig.process.ahead_process RUN
+
+The end of its standard input is its end.
+"""
+
+import _thread
+import os
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+
+#: Shortest pause between two passes, and the pause for each second that a pass took.
+PAUSE_S, PAUSE_PER_PASS = 1.0, 2.0
+
+
+def main() -> None:
+    """Process the run that is named until the input ends."""
+    _become_idle()
+    ended = threading.Event()
+    threading.Thread(target=_interrupt_at_end, args=(ended,), daemon=True).start()
+    with suppress(KeyboardInterrupt):
+        _follow(Path(sys.argv[1]), ended)
+
+
+def _become_idle() -> None:
+    """Take the processors only while nothing else wants them; on Windows it was started so."""
+    if sys.platform == "win32":
+        return
+    os.nice(19)
+    if hasattr(os, "SCHED_IDLE"):
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
+def _interrupt_at_end(ended: threading.Event) -> None:
+    sys.stdin.buffer.read()
+    ended.set()
+    _thread.interrupt_main()
+
+
+def _follow(run: Path, ended: threading.Event) -> None:
+    """Process a run whenever its journal has grown."""
+    # Not above: by now it gets no time that others want.
+    from labrig.foundation.clock import SystemClock
+    from labrig.process.run import process_so_far
+    from labrig.record import JOURNAL
+
+    clock, size_bytes, pause_s = SystemClock(), 0, PAUSE_S
+    while not ended.wait(pause_s):
+        before_bytes, size_bytes = size_bytes, _size_bytes(run / JOURNAL)
+        if size_bytes == before_bytes:
+            continue
+        began_s = clock.now()
+        # As long as frames are missing it fails, and whatever it is, the processing at the end
+        # reports it.
+        with suppress(Exception):
+            process_so_far(run)
+        pause_s = max(PAUSE_S, PAUSE_PER_PASS * (clock.now() - began_s))
+
+
+def _size_bytes(file: Path) -> int:
+    try:
+        return file.stat().st_size
+    except OSError:
+        return 0
+
+
+if __name__ == "__main__":
+    main()
