@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+from labrig.foundation.output_file import write_durably
 from labrig.record import JOURNAL
 
 #: Writes one frame: its new path and its content.
@@ -14,7 +15,7 @@ WriteFrame = Callable[[Path, bytes], None]
 class Replay:
     """What `run` recorded, recorded anew into `folder`: each frame before its journal line."""
 
-    def __init__(self, run: Path, folder: Path, write: WriteFrame = Path.write_bytes) -> None:
+    def __init__(self, run: Path, folder: Path, write: WriteFrame = write_durably) -> None:
         self.folder, self._run, self._write = folder, run, write
         (folder / "frames").mkdir(parents=True)
         for file in run.iterdir():

@@ -239,6 +239,7 @@ CAMPAIGNS = {
         _module("two_labrigs", "--trials", "40"),
         _module("suspended", "--trials", "20"),
         _module("announced_end", "--cuts", "200"),
+        _module("reduced_ahead", timed=True),
         _module("lamp_off_however_it_ends", timed=True),
         _module("gphoto2_latency", timed=True),
         _module("least_squares_starts"),

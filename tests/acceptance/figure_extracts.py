@@ -429,6 +429,13 @@ def overheads(printed: str) -> str:
     return "; ".join(f"{name}: {text}" for name, text in re.findall(row, printed, re.MULTILINE))
 
 
+def results_after(printed: str) -> str:
+    row = r"^reduced ahead: (yes|no) +result after (.* s); at 99 %: (.*)$"
+    rows = re.findall(row, printed, re.MULTILINE)
+    names = {"yes": "with", "no": "without"}
+    return "; ".join(f"{names[ahead]} {after} ({shots})" for ahead, after, shots in rows)
+
+
 def gains(printed: str) -> str:
     gain, rms, line = columns(
         r"^loss .* gain +(\S+) ± .* rms (\S+) σ; bend .* straight line (\S+) ±", printed
