@@ -25,6 +25,7 @@ from types import MappingProxyType
 import numpy as np
 
 from labrig.foundation.arrays import FloatArray
+from labrig.foundation.number_format import rounded
 
 #: Argument below which a series takes the place of a difference that loses digits.
 SERIES_BELOW = 0.03
@@ -279,10 +280,18 @@ def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _becquerel_formula(rate_per_s: float, shape: float) -> str:
-    tau_s = 1 / rate_per_s
     if shape == 0:
-        return f"exp(−t/{tau_s:.3g} s)"
-    return f"(1 + t/{tau_s / shape:.3g} s)^−{1 / shape:.3g}"
+        return f"exp(−t/{_seconds(1 / rate_per_s)})"
+    tau, power = _seconds(1 / (rate_per_s * shape)), rounded(1 / shape, 3)
+    return f"(1 + t/τ)⁻ᵖ, τ = {tau}, p = {power}"
+
+
+def _stretched_formula(rate_per_s: float, shape: float) -> str:
+    return f"exp(−(t/τ)ᵝ), τ = {_seconds(1 / rate_per_s)}, β = {rounded(shape, 3)}"
+
+
+def _seconds(time_s: float) -> str:
+    return f"{rounded(time_s, 3)} s"
 
 
 #: The laws by their names. Each contains an exponential. A further one is one more entry.
@@ -311,7 +320,7 @@ DECAY_LAWS: Mapping[str, DecayLaw] = MappingProxyType(
                 shapes=(0.0, 1.0),
                 limits=(0.0, 1.0),
                 formula=lambda rate_per_s, shape: (
-                    f"1/k = {1 / rate_per_s:.3g} s at lamp off, retrapping {shape:.2g}"
+                    f"1/k = {_seconds(1 / rate_per_s)} at lamp off, retrapping {rounded(shape, 2)}"
                 ),
                 short_label="one trap",
                 shape_name="retrapping",
@@ -323,7 +332,7 @@ DECAY_LAWS: Mapping[str, DecayLaw] = MappingProxyType(
                 means=stretched_means,
                 shapes=(0.1, 1.0),
                 limits=(1.0,),
-                formula=lambda rate_per_s, shape: f"exp(−(t/{1 / rate_per_s:.3g} s)^{shape:.3g})",
+                formula=_stretched_formula,
                 short_label="stretched",
                 forecast_shapes=(0.1, 1.0),
             ),

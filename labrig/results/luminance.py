@@ -300,7 +300,7 @@ class LuminanceDecay(NotebookViews):
         ]
         rows.append([f"until {VISIBLE_MCD_PER_M2:g} {MCD_PER_M2}", self._visible_text()])
         if self.slope is not None:
-            rows.append(["slope, 10 to 60 min", f"L ∝ t^−{self.slope}"])
+            rows.append(["slope, 10 to 60 min", f"L ∝ t⁻ⁿ, n = {self.slope}"])
         span = f"{duration_text(float(self.t_s[0]))} to {duration_text(float(self.t_s[-1]))}"
         rows.append(["light sum", f"{self.light_sum}, {span}"])
         rows.append(["excited by", self.excitation or "not stated: no standard's marking"])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from scipy.signal import lombscargle
 
 from labrig.fit import DecayFit, fit_decay, periodogram
 from labrig.fit.decay.diagnostics import unseen_flicker
@@ -128,3 +129,20 @@ def test_two_even_spacings_hide_their_common_period() -> None:
     found = unseen_flicker(t_s, np.zeros_like(t_s))
     assert found is not None
     assert 1.5 / found.period_s == pytest.approx(round(1.5 / found.period_s), abs=1e-3)
+
+
+@pytest.mark.parametrize("spacing", ["even", "uneven"])
+def test_the_periodogram_is_that_of_scipy(spacing: str) -> None:
+    draw = np.random.default_rng(4)
+    t_s = 5.0 * np.arange(40) if spacing == "even" else np.sort(draw.uniform(0, 200, 40))
+    residuals, signal_to_noise = draw.normal(size=40), draw.uniform(1, 300, 40)
+    lines = periodogram(t_s, residuals, signal_to_noise)
+    assert lines is not None
+    peer = lombscargle(
+        t_s - t_s[0],
+        residuals / signal_to_noise,
+        2 * np.pi * lines.frequency_hz,
+        normalize=True,
+        weights=signal_to_noise**2,
+    )
+    np.testing.assert_allclose(lines.power, peer, atol=1e-9)

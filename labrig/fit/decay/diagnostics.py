@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lombscargle
 from scipy.special import chdtr, chdtrc, fdtrc, ndtr
 
 from labrig.fit.decay.states import APART_SIGMAS, ILL_DETERMINED, sigmas_apart
@@ -32,6 +31,8 @@ MIN_VALUES, MAX_VALUES = 12, 1000
 HIGHEST, MIN_PERIODS = 2.5, 6.0
 #: Frequencies that are computed for each that is independent of the others.
 OVERSAMPLING = 5
+#: Part of Σ amplitudes² below which a sine is nothing but rounding.
+_NO_SINE = 1e-9
 #: Coherence |Σ exp(2πi f t)|/n of the times from which frames are evenly spaced, unless few frames
 #: have it by chance.
 EVEN = 0.6
@@ -94,6 +95,28 @@ class Periodogram:
         return float(1 - alone ** (2 / (self.n_values - 2)))
 
 
+def _explained_by_sines(
+    t_s: FloatArray, residuals: FloatArray, amplitudes: FloatArray, frequency_hz: FloatArray
+) -> FloatArray:
+    """Return the fraction of Σ residuals² that a sine of each frequency explains.
+
+    This is the periodogram of N. R. Lomb, Astrophysics and Space Science 39 (1976), for sines of
+    these amplitudes; `scipy.signal`, which has it, takes as long to load as such a fit takes.
+    """
+    turns = np.exp(2j * np.pi * np.outer(frequency_hz, t_s))
+    projected, doubled = turns @ (residuals * amplitudes), turns**2 @ amplitudes**2
+    # With the phase at which sine and cosine are orthogonal, as Lomb chooses it.
+    projected *= np.exp(-0.5j * np.angle(doubled))
+    total, odd = np.sum(amplitudes**2), np.abs(doubled)
+    cosine, sine = (total + odd) / 2, (total - odd) / 2
+    # Half the rate of evenly spaced values has a cosine alone.
+    has_sine = sine > _NO_SINE * total
+    explained = projected.real**2 / cosine
+    explained[has_sine] += projected.imag[has_sine] ** 2 / sine[has_sine]
+    power: FloatArray = explained / np.sum(residuals**2)
+    return power
+
+
 def periodogram(
     t_s: FloatArray, residuals: FloatArray, signal_to_noise: FloatArray
 ) -> Periodogram | None:
@@ -139,13 +162,7 @@ def periodogram(
         return None
     independent = (highest - lowest) * span_s
     frequency_hz = np.linspace(lowest, highest, int(OVERSAMPLING * independent) + 2)
-    power = lombscargle(
-        t_s - t_s[0],
-        residuals / signal_to_noise,
-        2 * np.pi * frequency_hz,
-        normalize=True,
-        weights=signal_to_noise**2,
-    )
+    power = _explained_by_sines(t_s - t_s[0], residuals, signal_to_noise, frequency_hz)
     return Periodogram(
         frequency_hz,
         np.clip(power, 0.0, 1.0),

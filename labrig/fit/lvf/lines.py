@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter1d
-from scipy.signal import find_peaks, peak_widths
 from scipy.special import chdtri
 
 from labrig.fit.nonlinear_least_squares import least_squares
@@ -268,6 +267,8 @@ def find_line_peaks(position: FloatArray, values: FloatArray) -> list[Peak]:
 
     They are searched channel by channel: in the sum neighbouring lines merge.
     """
+    from scipy.signal import find_peaks, peak_widths  # takes as long to load as half of labrig
+
     finest = max(float(np.diff(position).min()), float(np.ptp(position)) / MAX_SAMPLES)
     grid = np.arange(position[0], position[-1], finest)
     channels = np.stack([np.interp(grid, position, column) for column in values.T], axis=1)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from labrig.calibration import Noise
 from labrig.foundation.arrays import FloatArray
@@ -407,7 +407,7 @@ def _fit_line(points: Sequence[_Point], dark: Measured, bend: Bend) -> _Line:
     reduced = float(2 * fit.cost) / (len(points) - 1)
     jacobian: FloatArray = np.asarray(fit.jac, dtype=np.float64)
     covariance = np.linalg.inv(jacobian.T @ jacobian)
-    if chi2.sf(2 * fit.cost, len(points) - 1) < BY_CHANCE:
+    if chdtrc(len(points) - 1, 2 * fit.cost) < BY_CHANCE:
         covariance *= reduced
     return _Line(
         Measured(float(parameters[0]), float(np.sqrt(covariance[0, 0]))),

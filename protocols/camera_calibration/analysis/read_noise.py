@@ -20,8 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import expit, ndtr
-from scipy.stats import chi2
+from scipy.special import chdtri, expit, ndtr
 
 from labrig.foundation.arrays import FloatArray
 from labrig.reduce import rounding_slope, unrounded_variance
@@ -177,7 +176,7 @@ def _limit(counts: Sequence[NumberCounts]) -> float:
     limits = []
     for least, distance in ((1 - same, 1), (1 - same - next_to, 2)):
         changed = float(differences[np.abs(_NUMBER) >= distance].sum())
-        most = chi2.ppf(CONFIDENCE, 2 * (changed + 1)) / 2 / differences.sum()
+        most = chdtri(2 * (changed + 1), 1 - CONFIDENCE) / 2 / differences.sum()
         limits.append(float(np.interp(most, least.min(axis=1), noise)))
     return min(limits)
 
