@@ -145,12 +145,21 @@ class TableProvenance(FrozenModel):
     options: dict[str, str]
 
 
-def stated(
-    options: TableFitOptions | ChargeTableOptions, layout: TableLayout | None
-) -> dict[str, str]:
-    """Return what a person said of a fit and of its table, by name."""
-    said = asdict(options) | (asdict(layout) if layout is not None else {})
-    return {name: str(value) for name, value in said.items() if value is not None}
+def _provenance(
+    table: Path, options: TableFitOptions | ChargeTableOptions, layout: TableLayout | None
+) -> TableProvenance:
+    given = asdict(options) | (asdict(layout) if layout is not None else {})
+    return TableProvenance(
+        labrig=version("labrig"),
+        libraries=library_versions(),
+        table=table.name,
+        sha256=_checksum(table),
+        options={name: str(value) for name, value in given.items() if value is not None},
+    )
+
+
+def _checksum(file: Path) -> str:
+    return hashlib.sha256(read_bytes(file, MAX_TEXT_BYTES)).hexdigest()
 
 
 def report_table(
@@ -215,13 +224,7 @@ def report_table(
             for warning in part.fit.warnings
         ),
     )
-    provenance = TableProvenance(
-        labrig=version("labrig"),
-        libraries=library_versions(),
-        table=table.name,
-        sha256=hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest(),
-        options=stated(options, layout),
-    )
+    provenance = _provenance(table, options, layout)
     sample = [("SHA-256", provenance.sha256), *_uncertainties(fitted)]
     about = describe_without_run(table.stem, "decay", table.name, sample)
     sections, methods = decay.load("table_report")(result, about)
@@ -311,17 +314,10 @@ def report_charge(
     >>> sorted(path.name for path in reported.report.parent.iterdir())  # doctest: +ELLIPSIS
     ['figures', 'fit.json', 'material.yaml', 'provenance.yaml', 'readings.csv', 'report.html']
     """
-    checksum = hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest()
-    provenance = TableProvenance(
-        labrig=version("labrig"),
-        libraries=library_versions(),
-        table=table.name,
-        sha256=checksum,
-        options=stated(options, layout),
-    )
+    provenance = _provenance(table, options, layout)
     lamp = f"on at {options.on}, off at {options.off} by the table's clock"
     about = describe_without_run(
-        table.stem, "charge", table.name, [("SHA-256", checksum), ("Lamp", lamp)]
+        table.stem, "charge", table.name, [("SHA-256", provenance.sha256), ("Lamp", lamp)]
     )
     material = _material(table, fit)
     make_folder(folder)
@@ -429,16 +425,8 @@ def report_shared_decay(
     >>> report_shared_decay(paths, fit, series, "labrig fit decay", Path("both")).as_posix()
     'both/result/report.html'
     """
-    sample = [
-        *(
-            (
-                f"SHA-256 of {table.name}",
-                hashlib.sha256(read_bytes(table, MAX_TEXT_BYTES)).hexdigest(),
-            )
-            for table in tables
-        ),
-        ("Command", command),
-    ]
+    checksums = ((f"SHA-256 of {table.name}", _checksum(table)) for table in tables)
+    sample = [*checksums, ("Command", command)]
     names = ", ".join(table.name for table in tables)
     about = describe_without_run(f"{len(tables)} tables with shared rates", "decay", names, sample)
     report = shared_decay_report(fit, series, about)
@@ -482,10 +470,7 @@ def report_mixture(file: Path, fitted: FittedMatrix, command: str, folder: Path)
     >>> report_mixture(Path("paper.csv"), fitted, command, Path("mixture")).as_posix()
     'mixture/report.html'
     """
-    sample = [
-        ("SHA-256", hashlib.sha256(read_bytes(file, MAX_TEXT_BYTES)).hexdigest()),
-        ("Command", command),
-    ]
+    sample = [("SHA-256", _checksum(file)), ("Command", command)]
     about = describe_without_run(fitted.matrix.name, "mixture", file.name, sample)
     return write_with_report(folder, "fit.json", fitted.to_json(), mixture_report(fitted, about))
 
