@@ -32,6 +32,7 @@ from labrig.export import write_nexus
 from labrig.foundation.errors import DiskError, FitError, UsageError
 from labrig.foundation.output_file import make_folder_in, write_durably
 from labrig.foundation.plugins import measurement
+from labrig.foundation.processors import one_linear_algebra_thread
 from labrig.foundation.result_warning import (
     Contradiction,
     ResultWarning,
@@ -374,7 +375,8 @@ def _analysed(
     analyse = measurement(protocol.protocol, str(run.folder)).load("analysis")
     inputs = Inputs.of(rig)
     part = AnalysisContext(run, protocol, rig, overrides, inputs)
-    result: RunResult = analyse(part)
+    with one_linear_algebra_thread():
+        result: RunResult = analyse(part)
     lvf = inputs.updated_by(result)[LVF_KIND]
     camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
     warnings = (
