@@ -34,4 +34,5 @@ def one_linear_algebra_thread() -> AbstractContextManager[object]:
     # Not above: most of what asks for processors does not fit.
     from threadpoolctl import threadpool_limits
 
-    return threadpool_limits(limits=1, user_api="blas")
+    limited: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
+    return limited
