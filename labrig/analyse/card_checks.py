@@ -143,7 +143,9 @@ def fact_warnings(
             "excitation-extrapolated",
             "of the re-radiation under equal light {shares} is excited at {gaps_nm} nm, where no "
             "LED shone: that part is extrapolated",
-            shares=tuple(f"{fact.share:.0%} ({name})" for name, fact in extrapolated.items()),
+            shares=tuple(
+                f"{100 * fact.share:.0f} % ({name})" for name, fact in extrapolated.items()
+            ),
             gaps_nm=_gaps_nm(dark_nm, input_nm),
             share={name: fact.share for name, fact in extrapolated.items()},
         )

@@ -307,9 +307,9 @@ def _uncut(plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: flo
     n = float(plane.count.sum())
     if lowest > TOO_MANY * n > 0:
         raise FrameError(
-            f"{lowest / n:.1%} of the {plane.colour} pixels are cut off at black, so that their "
-            "level cannot be estimated: the camera subtracts more than its black level; raise its "
-            "black level (offset, brightness) if it has such a setting, or take another camera"
+            f"{100 * lowest / n:.1f} % of the {plane.colour} pixels are cut off at black, so that "
+            "their level cannot be estimated: the camera subtracts more than its black level; raise "
+            "its black level (offset, brightness) if it has such a setting, or take another camera"
         )
     mean = float(plane.value @ plane.count) / max(n, 1.0) + black_dn
     level = float(cut_off.level_dn(np.asarray(mean)))
@@ -506,7 +506,7 @@ class FrameMeasurement:
         if not cut:
             return []
         parts = ", ".join(
-            f"{name} {stats.cut_off / stats.n:.1%} (read noise {stats.read_dn:.3g} DN)"
+            f"{name} {100 * stats.cut_off / stats.n:.1f} % (read noise {stats.read_dn:.3g} DN)"
             for name, stats in cut.items()
         )
         return [

@@ -210,7 +210,7 @@ def difference_lines(differences: Sequence[ColourDifference]) -> Iterator[str]:
     >>> for line in difference_lines([ColourDifference("D65", "light", 0.5, 0.01)]):
     ...     print(line)
     light         ΔE2000   XYZ error  white
-    D65             0.50       1.00%  under the light
+    D65             0.50      1.00 %  under the light
     """
     yield f"{'light':12}{'ΔE2000':>8}{'XYZ error':>12}  white"
     for difference in differences:
@@ -218,7 +218,7 @@ def difference_lines(differences: Sequence[ColourDifference]) -> Iterator[str]:
             yield f"{difference.light:12}{'–':>8}{'–':>12}  the reference is black"
             continue
         yield (
-            f"{difference.light:12}{difference.delta_e:8.2f}{difference.xyz_error:12.2%}  "
+            f"{difference.light:12}{difference.delta_e:8.2f}{100 * difference.xyz_error:10.2f} %  "
             f"{white_text(difference)}"
         )
 

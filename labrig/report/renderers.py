@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from labrig.foundation.number_format import typeset
 from labrig.foundation.plugins import measurement
 from labrig.report.run_sections import budget_lines, budget_sections
 from labrig.report.sections import Rendered, Renderer, Section, Source, Table
@@ -89,7 +90,7 @@ def render(result: RunResult, source: Source) -> Rendered:
     return replace(
         rendered,
         sections=(*rendered.sections, *budget_sections(result)),
-        lines=(*rendered.lines, *budget_lines(result)),
+        lines=tuple(map(typeset, (*rendered.lines, *budget_lines(result)))),
     )
 
 

@@ -39,4 +39,4 @@ def chart_found(frames: Sequence[FrameRecord]) -> str:
     patches = find_colour_chart(metered.path)
     middles = [(x + wide / 2, y + high / 2) for x, y, wide, high in patches]
     x, y = (sum(values) / len(values) for values in zip(*middles, strict=True))
-    return f"{len(patches)} patches about {x:.0%} across and {y:.0%} down the frame"
+    return f"{len(patches)} patches about {100 * x:.0f} % across and {100 * y:.0f} % down the frame"

@@ -46,7 +46,7 @@ class Darkness:
         if not self.light:
             return "dark"
         fading = ", fading" if self.fades else ""
-        return f"{self.light:.1%} of the range in {duration_text(self.exposure_s)}{fading}"
+        return f"{100 * self.light:.1f} % of the range in {duration_text(self.exposure_s)}{fading}"
 
     @property
     def is_bright(self) -> bool:

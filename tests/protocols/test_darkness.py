@@ -98,4 +98,4 @@ def test_a_little_light_is_reported_and_subtracted(k_per_s: float, said: str) ->
 def test_what_is_left_is_a_share_of_the_range() -> None:
     found = taken(lambda _: RANGE_DN / 10, (0.01, 1.0))
     assert found.light == pytest.approx(0.099)
-    assert str(found) == "9.9% of the range in 1 s"
+    assert str(found) == "9.9 % of the range in 1 s"

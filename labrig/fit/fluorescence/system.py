@@ -408,7 +408,7 @@ def fluorescence_system(
         if inside < MIN_INSIDE:
             raise UsageError(
                 f"light '{exposure.light.name}': expected its power from {in_edges[0]:g} to "
-                f"{in_edges[-1]:g} nm, got {inside:.0%} of it there; leave it out"
+                f"{in_edges[-1]:g} nm, got {100 * inside:.0f} % of it there; leave it out"
             )
     low_nm, high_nm = min(in_edges[0], out_edges[0]), max(in_edges[-1], out_edges[-1])
     grid_nm = np.arange(low_nm, high_nm + LIGHT_STEP_NM, LIGHT_STEP_NM)

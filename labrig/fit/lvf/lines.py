@@ -117,8 +117,8 @@ class LineModel:
         explained = 1 - float(residual.var() / (self.values - self.values.mean(axis=0)).var())
         if explained < MIN_EXPLAINED:
             raise FitError(
-                f"no lines of mercury: lines explain {explained:.0%} of the profile, expected "
-                f"{MIN_EXPLAINED:.0%} or more; check that no other lamp is lit"
+                f"no lines of mercury: lines explain {100 * explained:.0f} % of the profile, "
+                f"expected {100 * MIN_EXPLAINED:.0f} % or more; check that no other lamp is lit"
             )
         wavelength_nm = np.array([line.wavelength_nm[0] for line in self.lines])
         return LocatedLines(

@@ -84,7 +84,8 @@ class TexelMap:
         if n_shared > SHARED_POINTS * covered:
             raise UsageError(
                 f"{name}: expected every texel at one place, got texture coordinates of which "
-                f"{n_shared / covered:.0%} belong to two triangles; unwrap it without overlap"
+                f"{100 * n_shared / covered:.0f} % belong to two triangles; unwrap it without "
+                "overlap"
             )
         chart_of_face = _charts(mesh)
         cells = np.where(face_at >= 0, chart_of_face[face_at], -1)

@@ -479,7 +479,7 @@ def _cut_warnings(view: View, outline: Outline) -> list[ResultWarning]:
             "outline is used, and its error is in σ: enlarge the region",
             subject="region",
             sides=tuple(
-                f"{side} by {px:.0f} px ({px / outline.radius:.0%} of its radius)"
+                f"{side} by {px:.0f} px ({100 * px / outline.radius:.0f} % of its radius)"
                 for side, px in cut.items()
             ),
         )
