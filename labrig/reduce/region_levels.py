@@ -309,7 +309,8 @@ def _uncut(plane: PlaneCount, cut_off: BlackCutOff, black_dn: float, lowest: flo
         raise FrameError(
             f"{100 * lowest / n:.1f} % of the {plane.colour} pixels are cut off at black, so that "
             "their level cannot be estimated: the camera subtracts more than its black level; "
-            "raise its black level (offset, brightness) if it has such a setting, or take another camera"
+            "raise its black level (offset, brightness) if it has such a setting, or take another "
+            "camera"
         )
     mean = float(plane.value @ plane.count) / max(n, 1.0) + black_dn
     level = float(cut_off.level_dn(np.asarray(mean)))
