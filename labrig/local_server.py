@@ -231,14 +231,15 @@ class RequestHandler(BaseHTTPRequestHandler):
         kind: str,
         data: bytes,
         more: Mapping[str, str] | None = None,
+        policy: str = CONTENT_POLICY,
     ) -> None:
-        """Send `data` of a content type, with further headers."""
+        """Send `data` of a content type, with further headers, under a content security policy."""
         self.send_response(status)
         for name, value in (
             ("Content-Type", kind),
             ("Content-Length", str(len(data))),
             ("Cache-Control", "no-store"),
-            ("Content-Security-Policy", CONTENT_POLICY),
+            ("Content-Security-Policy", policy),
             ("Referrer-Policy", "no-referrer"),
             ("X-Content-Type-Options", "nosniff"),
             *(more or {}).items(),

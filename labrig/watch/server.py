@@ -1,6 +1,7 @@
 """Server of the page of `labrig watch`, which sends every change of a run's state."""
 
 import json
+import re
 import threading
 from collections.abc import Callable, Mapping
 from http import HTTPStatus
@@ -8,8 +9,9 @@ from pathlib import Path
 from typing import Any, ClassVar, Never
 
 from labrig.foundation.clock import Clock
-from labrig.foundation.input_file import read_text
+from labrig.foundation.input_file import read_bytes, read_text
 from labrig.local_server import KINDS, LocalServer, RequestHandler
+from labrig.record import require_plain_folder
 from labrig.watch.run_follower import RunFollower
 
 #: Period of messages without which a browser takes the connection for dead.
@@ -31,6 +33,16 @@ PAGES: Mapping[str, Path] = {
         "watch_plot.js",
     )
 }
+
+#: Report of a run and its figures, as its page links to them.
+_RESULT = re.compile(r"result/(report\.html|figures/[\w-]+\.svg)")
+_KINDS = KINDS | {".svg": "image/svg+xml"}
+MAX_REPORT_BYTES = 200_000_000
+#: A report has all that it shows within itself.
+REPORT_POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+    "frame-ancestors 'none'"
+)
 
 #: Section → key → value; None for a value that no longer exists.
 Things = Mapping[str, Mapping[str, Any]]
@@ -110,10 +122,12 @@ class UpdateFeed:
 
 
 class WatchServer(LocalServer):
-    """Server of the page and of the updates.
+    """Server of the page, of the updates, and of the report once there is one.
 
     Parameters
     ----------
+    run
+        Run folder, for its report.
     news
         Updates of the run's state.
     port
@@ -125,8 +139,8 @@ class WatchServer(LocalServer):
         If the port is taken.
     """
 
-    def __init__(self, news: UpdateFeed, port: int = 0) -> None:
-        self.news = news
+    def __init__(self, run: Path, news: UpdateFeed, port: int = 0) -> None:
+        self.run, self.news = run, news
         super().__init__(port, _Conversation)
 
 
@@ -137,7 +151,7 @@ class _Conversation(RequestHandler):
     pages: ClassVar[Mapping[str, Path]] = PAGES
 
     def answer(self, path: str) -> None:
-        """Send the page, the stream of updates, or the latest frame."""
+        """Send the page, the stream of updates, the latest frame, or the report."""
         if path == "":
             self._send_page()
         elif path == "events":
@@ -148,8 +162,17 @@ class _Conversation(RequestHandler):
                 self.refuse(HTTPStatus.NOT_FOUND, "no frame yet")
             else:
                 self.send(HTTPStatus.OK, "image/jpeg", picture)
+        elif found := _RESULT.fullmatch(path):
+            self._send_result(found[1])
         else:
             super().answer(path)
+
+    def _send_result(self, name: str) -> None:
+        """Send the report or one of its figures; whoever made it, it reaches nothing else."""
+        folder = self.server.run / "result"
+        require_plain_folder(folder)
+        content = read_bytes(folder / name, MAX_REPORT_BYTES)
+        self.send(HTTPStatus.OK, _KINDS[Path(name).suffix], content, policy=REPORT_POLICY)
 
     def _send_page(self) -> None:
         """Send the page with the present state of the run in it, so that it is never empty."""
@@ -239,7 +262,7 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     follower = RunFollower(run)
     follower.look()
     news = UpdateFeed(follower.state(), follower.picture)
-    with WatchServer(news, port) as server, server.running():
+    with WatchServer(run, news, port) as server, server.running():
         try:
             tell(server.url)
             while True:

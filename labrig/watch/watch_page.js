@@ -11,7 +11,7 @@ const NOTHING_NEXT = {
   interrupted: "Nobody is at it. Go on with: labrig resume",
   failed: "A fault ended it. Go on with: labrig resume",
   recorded: "Everything is recorded; the analysis follows, or else: labrig process",
-  processed: "Done; the report is in the run's folder: result/report.html",
+  processed: "Done.",
 };
 const MOST_TROUBLES = 5;
 const state = { run: {}, units: {}, points: {}, frame: {}, troubles: {}, results: {} };
@@ -116,7 +116,13 @@ function showSteps() {
   const standing = state.run.now;
   $("unit").textContent = standing ? state.units[standing.unit].name : "";
   if (!standing) {
-    $("steps").replaceChildren(tag("li", NOTHING_NEXT[state.run.status], "alone"));
+    const entry = tag("li", `${NOTHING_NEXT[state.run.status]} `, "alone");
+    if (state.run.status === "processed") {
+      const link = tag("a", "Open the report");
+      link.href = "result/report.html";
+      entry.append(link);
+    }
+    $("steps").replaceChildren(entry);
     return;
   }
   const at = position();

@@ -285,7 +285,7 @@ class Watching:
     def __init__(self, run: Path) -> None:
         self.following = RunFollower(run)
         self.news = UpdateFeed(settled(self.following), self.following.picture)
-        self.server = WatchServer(self.news)
+        self.server = WatchServer(run, self.news)
 
     def look(self) -> None:
         self.news.tell(settled(self.following), self.following.picture)
@@ -327,6 +327,31 @@ def test_nobody_else_gets_to_see_it(watching: Watching) -> None:
         connection.request("GET", path, headers={"Host": host})
         assert connection.getresponse().status == 403
         connection.close()
+
+
+def test_the_report_and_its_figures_are_served_and_nothing_else(watching: Watching) -> None:
+    result = watching.following.run / "result"
+    assert answered(watching, "result/report.html")[0] == 400
+    (result / "figures").mkdir(parents=True)
+    for name in ("report.html", "figures/1-laws.svg", "fit.json"):
+        (result / name).write_text(name)
+    assert answered(watching, "result/report.html") == (200, b"report.html")
+    assert answered(watching, "result/figures/1-laws.svg") == (200, b"figures/1-laws.svg")
+    for name in ("fit.json", "figures/../../journal.jsonl", "figures/..%2f1-laws.svg"):
+        assert answered(watching, f"result/{name}")[0] == 404
+    (result / "figures" / "2-laws.svg").symlink_to(watching.following.run / "journal.jsonl")
+    assert answered(watching, "result/figures/2-laws.svg")[0] == 400
+
+
+def answered(watching: Watching, path: str) -> tuple[int, bytes]:
+    """The status and the content of the answer to a path."""
+    place = urlsplit(watching.server.url)
+    connection = http.client.HTTPConnection("127.0.0.1", place.port or 0, timeout=PATIENCE_S)
+    connection.request("GET", f"{place.path}{path}")
+    answer = connection.getresponse()
+    content = answer.read()
+    connection.close()
+    return answer.status, content
 
 
 @dataclass(frozen=True)
@@ -557,8 +582,11 @@ def test_the_page_follows_the_run_and_finds_back(
     watching.look()
     wait.until(lambda _: text(chromium, "state") == "processed")
     assert "0.03" in text(chromium, "results")
-    assert "the report is" in text(chromium, "steps")
     keep(chromium, "watch-finished", tmp_path)
+    chromium.find_element(By.LINK_TEXT, "Open the report").click()
+    wait.until(lambda _: chromium.title.startswith("two papers"))
+    chromium.back()
+    wait.until(lambda _: text(chromium, "state") == "processed")
     logged = chromium.get_log("browser")  # type: ignore[no-untyped-call]
     assert all("events" in entry["message"] for entry in logged), logged
     for width in (1200, 800, 400):
