@@ -48,14 +48,15 @@ def rounded(value: float, digits: int = 4) -> str:
         return "–"
     if value == 0:
         return "0"
-    exponent = _exponent(float(f"{value:.{digits - 1}e}"))
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    exponent = int(power)
     if MIN_PLAIN <= 10.0**exponent < MAX_PLAIN:
         decimals = digits - 1 - exponent
         text = f"{round(value, decimals):.{max(decimals, 0)}f}"
         text = text.rstrip("0").rstrip(".") if "." in text else text
         return text.replace("-", "−")
-    mantissa = f"{value / 10.0**exponent:.{digits - 1}f}".rstrip("0").rstrip(".")
-    return f"{mantissa.replace('-', '−')} × {power_of_ten(exponent)}"
+    mantissa = mantissa.rstrip("0").rstrip(".").replace("-", "−")
+    return f"{mantissa} × {power_of_ten(exponent)}"
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:

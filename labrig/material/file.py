@@ -49,6 +49,7 @@ MEASURED = (
 RANGED = ("k_e_per_s", "reradiation")
 #: Fields that are written where the kinetic order is not 1.
 OF_ORDER = ("kinetic_order", "kinetic_order_sigma", "decay_time_s", "decay_time_s_sigma")
+ORDER_LIMIT = "kinetic_order_limit_95"
 #: Fields of a material that are written where they are known.
 WHERE_KNOWN = (
     "scale",
@@ -84,6 +85,9 @@ class IrradianceNorm(FrozenModel):
 
 class State(FrozenModel):
     """One excited state: what was not measured is null; every σ is one standard deviation.
+
+    A 0 with a σ is at its bound, since neither rate nor light is negative: with 95 % probability
+    the quantity is below 1.645 σ. An `r0` of 1 likewise is above 1 − 1.645 σ.
 
     Attributes
     ----------
@@ -121,6 +125,10 @@ class State(FrozenModel):
         Standard deviation of `k_r_per_s`, in 1/s.
     kinetic_order_sigma
         Standard deviation of `kinetic_order`.
+    kinetic_order_limit_95
+        Limit of the order with 95 % probability, where its fit ended at the least or largest
+        possible order, `kinetic_order`: the order is between the two. Default: the order is inside
+        its bounds, or it was not fitted.
     amplitude_sigma
         Standard deviation of `amplitude`, in its unit.
     r0_sigma
@@ -145,6 +153,7 @@ class State(FrozenModel):
     reradiation_range: tuple[Series, Series] | None = None
     k_r_per_s_sigma: NotNegative | None = None
     kinetic_order_sigma: NotNegative | None = None
+    kinetic_order_limit_95: Order | None = None
     amplitude_sigma: NotNegative | None = None
     r0_sigma: NotNegative | None = None
     decay_time_s_sigma: NotNegative | None = None
@@ -232,9 +241,13 @@ class State(FrozenModel):
         content: dict[str, Any] = handler(self)
         if self.amplitude_unit is None:
             content.pop("amplitude_unit", None)
+        if self.kinetic_order_limit_95 is None:
+            content.pop(ORDER_LIMIT, None)
         if self.kinetic_order == 1:
+            held = () if self.kinetic_order_limit_95 is None else OF_ORDER[:2]
             for name in OF_ORDER:
-                content.pop(name, None)
+                if name not in held:
+                    content.pop(name, None)
         for name in RANGED:
             if getattr(self, f"{name}_range") is None:
                 content.pop(f"{name}_range", None)

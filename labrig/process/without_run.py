@@ -36,6 +36,7 @@ from labrig.results import (
     SharedDecay,
     StateDepth,
     TableLayout,
+    order_fields,
     trap_depths_json,
     write_csv,
     write_result,
@@ -364,11 +365,9 @@ def _material(table: Path, fit: ChargeFit) -> Material | None:
 def _state(state: OrderState) -> State | None:
     """Return a state of the material; None if its k_r and r(0) are not known apart."""
     amplitude, order = state.amplitude, state.order
-    own = {"amplitude": amplitude.value, "amplitude_sigma": amplitude.sigma}
+    own = {"amplitude": amplitude.value, "amplitude_sigma": amplitude.sigma, **order_fields(order)}
     if state.k_r_per_s is not None and state.r0 is not None:
         own |= {"r0": state.r0.value, "r0_sigma": state.r0.sigma}
-        if order.value > 1:
-            own |= {"kinetic_order": order.value, "kinetic_order_sigma": order.sigma}
         k_r = state.k_r_per_s
         return State(k_r_per_s=k_r.value, k_r_per_s_sigma=k_r.sigma, **own)
     rate = state.rate_at_off_per_s

@@ -9,6 +9,7 @@ import numpy as np
 from labrig.foundation.number_format import aligned, plus_minus, rounded
 from labrig.material import Albedo, Material, MaterialComparison, RadianceFactor, State
 from labrig.report.sections import Table
+from labrig.results import ONE_SIDED_SIGMAS, OneSided
 
 UNKNOWN = "–"
 #: Units of amplitude and Λ by the scale of a material.
@@ -212,7 +213,7 @@ def _rows(
     """Yield the rows of k_r, kinetic order, r(0), and k_e and Λ by band."""
     amplitude_unit, reradiation_unit = UNITS[scale]
     own = [("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")]
-    if any(state.kinetic_order != 1 for state in states):
+    if any(state.kinetic_order != 1 or state.kinetic_order_limit_95 for state in states):
         own.insert(1, ("kinetic order b", "kinetic_order"))
     for quantity, name in own:
         if any(getattr(state, name) is not None for state in states):
@@ -234,16 +235,24 @@ def _rows(
 def _quantity_text(state: State, name: str, band: int | None = None) -> str:
     """Return a quantity of a state as text, in a band if there are bands.
 
-    Its range by the thickness of the sample, if it has one, stands before value and σ.
+    Its range by the thickness of the sample, if it has one, stands before value and σ. What is at
+    its bound is text of its limit.
     """
     value, sigma = state.known(name), getattr(state, f"{name}_sigma")
     if name == "decay_time_s" and value is None:
         value = state.decay_time_of_rate_s
     if value is None:
         return UNKNOWN
+    if name == "kinetic_order" and state.kinetic_order_limit_95 is not None:
+        order_sigma = abs(state.kinetic_order_limit_95 - value) / ONE_SIDED_SIGMAS
+        return OneSided(value, order_sigma, limit=state.kinetic_order_limit_95).plus_minus
+    if band is not None:
+        value, sigma = value[band], None if sigma is None else sigma[band]
+    text = _value_text(value, math.nan if sigma is None else sigma)
+    if sigma and (value == 0 or (name == "r0" and value == 1)):
+        return OneSided.held(value, sigma, 0.0, is_upper=value == 1).plus_minus
     if band is None:
-        return _value_text(value, math.nan if sigma is None else sigma)
-    text = _value_text(value[band], math.nan if sigma is None else sigma[band])
+        return text
     ends = getattr(state, f"{name}_range")
     if ends is None or ends[0][band] == ends[1][band]:
         return text

@@ -140,7 +140,8 @@ def mixture_warnings(fit: MixtureFit) -> tuple[ResultWarning, ...]:
 def component_head(fit: MixtureFit) -> tuple[str, ...]:
     """Return the heads of the columns of `component_rows`."""
     head = ("weight", "incident / nm", "returning / nm", "σ / nm", "correlation")
-    return head if fit.mixture.skew is None else (*head, "skew")
+    skew = () if fit.mixture.skew is None else ("skew",)
+    return (*head, *skew, *(("at its bound",) if fit.at_bound else ()))
 
 
 def held_out_errors(candidates: Sequence[MixtureCandidate]) -> list[tuple[int, float]]:
@@ -151,11 +152,16 @@ def held_out_errors(candidates: Sequence[MixtureCandidate]) -> list[tuple[int, f
 
 
 def component_rows(fit: MixtureFit) -> Iterator[tuple[str, ...]]:
-    """Yield weight, means, standard deviations, correlation and skews of each component."""
+    """Yield weight, means, standard deviations, correlation and skews of each component.
+
+    The names of what a bound holds follow, where one does.
+    """
     mixture = fit.mixture
-    for weight, mean, covariance, skew in zip(
+    components = zip(
         mixture.weights, mixture.mean_nm, mixture.covariance_nm2, mixture.skews, strict=True
-    ):
+    )
+    for number, (weight, mean, covariance, skew) in enumerate(components, start=1):
+        held = ", ".join(name for own, name in fit.at_bound if own == number)
         sd = np.sqrt(np.diag(covariance))
         yield (
             f"{weight:.3f}",
@@ -164,6 +170,7 @@ def component_rows(fit: MixtureFit) -> Iterator[tuple[str, ...]]:
             f"{sd[0]:.1f}, {sd[1]:.1f}",
             f"{covariance[0, 1] / sd.prod():+.2f}",
             *(() if mixture.skew is None else (f"{skew[0]:+.2f}, {skew[1]:+.2f}",)),
+            *((held,) if fit.at_bound else ()),
         )
 
 

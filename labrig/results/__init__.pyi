@@ -65,6 +65,7 @@ from .fitted_excitation import (
     ExcitedState as ExcitedState,
     FittedExcitation as FittedExcitation,
     LayerEffect as LayerEffect,
+    order_fields as order_fields,
     spans_decades as spans_decades,
 )
 from .fitted_law import (
@@ -119,6 +120,7 @@ from .luminance import (
     luminance_unit as luminance_unit,
 )
 from .measured import (
+    ONE_SIDED_SIGMAS as ONE_SIDED_SIGMAS,
     ONLY as ONLY,
     Measured as Measured,
     OneSided as OneSided,

@@ -1,5 +1,6 @@
 """Fit of an excitation: rates of states and bands, closure, and the range that thickness leaves."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -144,6 +145,37 @@ class ExcitedState:
     def k_e_upper_per_s(self) -> FloatArray:
         """Upper limit of k_e in 1/s with 95 % probability, shape (B,)."""
         return self.k_e_per_s + UPPER_SIGMAS * self.k_e_per_s_sigma
+
+
+def order_fields(order: Measured) -> dict[str, float | None]:
+    """Return a fitted kinetic order as the fields of a material's state.
+
+    Parameters
+    ----------
+    order
+        The order, one-sided where it is at its bound; σ is 0 where it was held.
+
+    Returns
+    -------
+    dict
+        `kinetic_order`, its σ and its limit, None where there is none.
+
+    Examples
+    --------
+    >>> from labrig.results import Measured, OneSided, order_fields
+    >>> order_fields(Measured(1.0, 0.0))
+    {'kinetic_order': 1.0, 'kinetic_order_sigma': None, 'kinetic_order_limit_95': None}
+    >>> order_fields(OneSided.held(1.0, 0.1, pull=0.0))["kinetic_order_limit_95"]
+    1.1645
+    """
+    limit = None
+    if isinstance(order, OneSided) and math.isfinite(order.limit):
+        limit = min(max(order.limit, 1.0), MAX_ORDER)
+    return {
+        "kinetic_order": order.value,
+        "kinetic_order_sigma": order.sigma if 0 < order.sigma < math.inf else None,
+        "kinetic_order_limit_95": limit,
+    }
 
 
 @dataclass(frozen=True)

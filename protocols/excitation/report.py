@@ -359,6 +359,8 @@ def _light_line(light: LightScatter) -> str:
 def _veil_line(veil: Measured) -> str:
     """Return the sentence on the light of the frame that lies over all places."""
     fraction = plus_minus(100 * veil.value, 100 * veil.sigma)
+    if isinstance(veil, OneSided):
+        fraction = replace(veil, sigma=100 * veil.sigma, limit=100 * veil.limit).plus_minus
     return f"Over every place lies {fraction} % of the frame's mean light, which is reckoned with."
 
 

@@ -200,7 +200,7 @@ class ExcitationResult(RunResult):
             write_json(place / "excitation.json", finite(self._fit_content(patch)))
 
     def _fit_content(self, patch: PatchExcitation) -> dict[str, Any]:
-        fit, light = patch.fit, patch.light
+        fit, light, veil = patch.fit, patch.light, patch.fit.veil
         level_at_off = fit.at_off[-1]
         return {
             "schema_version": self.schema_version,
@@ -235,8 +235,9 @@ class ExcitationResult(RunResult):
                 "wavelength_error_nm": light.wavelength_nm,
                 "site_scatter": light.sites,
             },
-            "veil": None if fit.veil is None else fit.veil.value,
-            "veil_sigma": None if fit.veil is None else fit.veil.sigma,
+            "veil": None if veil is None else veil.value,
+            "veil_sigma": None if veil is None else veil.sigma,
+            "veil_limit_95": None if veil is None else measured_number(veil).get("limit_95"),
             "by_band": None if fit.by_band is None else _by_band(fit.by_band),
             "channel_weights": fit.channel_weights.tolist(),
             "reduced_chi2": fit.reduced_chi2,

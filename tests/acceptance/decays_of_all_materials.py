@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from labrig.cli.exit_codes import guarded
 from labrig.foundation import resources
 from labrig.material import read_material
+from labrig.results import EXPONENTIALS
 
 WITHOUT_TRUE_STATES = "power-law"
 
@@ -111,7 +112,8 @@ def assessment(fit: dict[str, object], material: str) -> str:
     """Return one line with the outcome."""
     said = f"χ² {fit['reduced_chi2']:.2f}  ρ {fit['flicker']:.4f}  n {fit['n_states']}"
     if material == WITHOUT_TRUE_STATES:
-        return f"{said}  {'flagged' if fit['better_model'] else 'NOT FLAGGED'}  {fit['warnings']}"
+        verdict = "NOT FLAGGED" if fit["law"] == EXPONENTIALS else f"flagged ({fit['law']})"
+        return f"{said}  {verdict}  {fit['warnings']}"
     if not has_true_number_of_states(fit, material):
         true = len(read_material(material).states)
         return f"{said}  WRONG n (true {true})  {fit['states']} {fit['warnings']}"

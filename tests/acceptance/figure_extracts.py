@@ -318,10 +318,7 @@ def went_wrong(printed: str) -> str:
 
 
 def growth(printed: str) -> str:
-    first, *_, last = (line.split() for line in printed.splitlines()[1:-2])
-    names = ("MB of memory", "files", "threads")
-    pairs = zip(first[2:5], last[2:5], names, strict=True)
-    return ", ".join(f"{before} to {after} {name}" for before, after, name in pairs)
+    return match(r"^((?:less|more) than .* stay)$", printed)
 
 
 def containers(printed: str) -> str:

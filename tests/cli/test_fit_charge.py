@@ -53,6 +53,37 @@ def test_intervals_of_the_order_are_printed_and_on_the_page(
     assert "profile likelihood" in page
 
 
+def test_an_order_at_its_bound_has_a_limit_in_every_file(labrig: Labrig, tmp_path: Path) -> None:
+    """A state of first order, whose fitted order is 1 or just above as the noise has it."""
+    lit_s, dark_s = np.clip(T_S - 30, 0, 170), np.maximum(T_S - 200, 0)
+    level = lit_concentration(0.0, 0.02, 0.015, 1.0, lit_s) * np.exp(-0.015 * dark_s)
+    light = 0.015 * level + np.where(dark_s == 0, 0.02 * level, 0)
+    held = []
+    for seed in range(4):
+        counts = np.random.default_rng(100 + seed).poisson(1e6 * light)
+        path, made = tmp_path / f"{seed}.csv", tmp_path / f"{seed}" / "result"
+        np.savetxt(
+            path, np.transpose([T_S, counts]), header="t_s,counts", delimiter=",", comments=""
+        )
+        command = ("fit", "charge", path, "--on", "30", "--off", "200", "--states", "1")
+        ended = labrig(*command, "--order", "general", "--out", made.parent)
+        assert ended.code == 0, ended.err
+        (fitted,) = json.loads((made / "fit.json").read_text(encoding="utf-8"))["states"]
+        (state,) = read_material(made / "material.yaml").states
+        limit = fitted["order"].get("limit_95")
+        held.append(limit is not None)
+        assert state.kinetic_order == fitted["order"]["value"]
+        assert state.kinetic_order_limit_95 == limit
+        if limit is not None:
+            assert state.kinetic_order == 1
+            assert 1 < limit < 1.1
+            text = f"< {limit:.4f}"[:5]
+            assert text in ended.out
+            assert text in labrig("material", "show", made / "material.yaml").out
+            assert text in (made / "report.html").read_text(encoding="utf-8").replace("&lt;", "<")
+    assert 0 < sum(held) < len(held)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

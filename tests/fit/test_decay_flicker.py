@@ -146,3 +146,24 @@ def test_the_periodogram_is_that_of_scipy(spacing: str) -> None:
         weights=signal_to_noise**2,
     )
     np.testing.assert_allclose(lines.power, peer, atol=1e-9)
+
+
+def test_a_steady_light_of_many_photons_is_no_flicker_that_drifts() -> None:
+    """A least flicker of 0.1 % would be three times the noise: that there is none may be true."""
+    t_s, weights, rate_per_s = np.linspace(3.0, 180.0, 100), np.array([1.0, 0.5, 0.1]), 0.02
+    signal = 1000 * np.exp(-rate_per_s * t_s)[:, np.newaxis] * weights
+    sigma = np.sqrt(signal / 1000 + 1e-4)
+    pulls, told = [], []
+    for seed in range(60):
+        noise = np.random.default_rng([31, seed]).standard_normal(signal.shape)
+        fit = fit_decay(
+            t_s, signal + sigma * noise, sigma, channels=("R", "G", "B"), flicker=None,
+            offset_sigma=np.inf, n_states=1,
+        )  # fmt: skip
+        (state,) = fit.states
+        pulls.append((state.k_r_per_s - rate_per_s) / state.k_r_per_s_sigma)
+        told += codes(fit.warnings)
+    # Of such series with independent noise one in 240 is told to correlate.
+    assert told.count("noise-correlated") < 2
+    # σ allows for a drift along with the decay, which leaves no scatter.
+    assert 0.6 < (rms := float(np.sqrt(np.mean(np.square(pulls))))) < 0.85, rms

@@ -11,7 +11,14 @@ from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.foundation.errors import FitError
 from labrig.material import Material, dark_step, read_material
-from labrig.results import Charge, ChargingSeries, EarlierCharges, FittedExcitation, Transient
+from labrig.results import (
+    Charge,
+    ChargingSeries,
+    EarlierCharges,
+    FittedExcitation,
+    OneSided,
+    Transient,
+)
 from tests.fit.charged_samples import BARE, DOOR_S, WEIGHTS, Bench, lvf_windows, two_states
 from tests.pulls import assert_sigma_is_right
 from tests.warned import codes, of_code
@@ -210,7 +217,18 @@ def test_light_of_the_frame_over_all_sites_excites_nothing() -> None:
     assert (np.abs(other.k_e_per_s - k_e) > 4 * other.k_e_per_s_sigma).any()
     assert ignored.veil is None
     assert found.veil is not None
+    assert not isinstance(found.veil, OneSided)
     assert abs(found.veil.value - 0.03) < 3 * found.veil.sigma < 0.06
+
+
+def test_a_veil_that_is_not_seen_has_a_limit() -> None:
+    for seed in (11, 12):
+        bench = Bench(read_material("blue-paint"), seed=seed)
+        sigmas = RelativeSigmas(bench.flicker, LAMP, scale=0.005, veil=0.02)
+        veil = fit(measured_in_frames(bench), [0.03], [1.0], sigmas).veil
+        assert isinstance(veil, OneSided)
+        assert veil.value == 0
+        assert 0.01 < veil.limit < 1.645 * 0.02
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.02])

@@ -17,6 +17,7 @@ from labrig.fit import MixtureFit, fit_mixture
 from labrig.foundation.errors import DataError, UsageError
 from labrig.material import ReradiationMatrix, ReradiationMixture, compare_colours
 from labrig.optics import read_light
+from labrig.report import FittedMatrix, describe_mixture
 
 INPUT_NM = np.arange(300.0, 781.0, 10.0)
 OUTPUT_NM = np.arange(380.0, 781.0, 10.0)
@@ -374,6 +375,22 @@ def test_light_of_a_single_wavelength_is_a_narrow_component(skewed: bool) -> Non
     fit = fit_mixture(matrix, 1, threshold=0.01, skewed=skewed)
     assert_allclose(fit.mixture.mean_nm, [[425, 600]], atol=1)
     assert_allclose(bands(fit.mixture).sum(), 0.6, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("peak_nm", "held"), [(840.0, True), (700.0, False)])
+@pytest.mark.parametrize("skewed", [False, True])
+def test_a_peak_beyond_the_measured_wavelengths_is_named(
+    peak_nm: float, held: bool, skewed: bool
+) -> None:
+    dye = ReradiationMixture(
+        20.0, np.ones(1), np.array([[460.0, peak_nm]]), np.array([[[900.0, 100], [100, 1600]]])
+    )
+    matrix = dye.to_matrix(INPUT_NM, OUTPUT_NM)
+    fit = fit_mixture(matrix, 1, threshold=1e-9, skewed=skewed)
+    name = f"{'median' if skewed else 'mean'} of the returning light"
+    assert json.loads(fit.to_json())["at_bound"] == held * [{"component": 1, "parameter": name}]
+    text = describe_mixture(FittedMatrix(matrix, fit))
+    assert ("at its bound" in text, name in text) == (held, held)
 
 
 def test_the_same_matrix_gives_the_same_text() -> None:

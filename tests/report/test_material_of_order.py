@@ -57,3 +57,24 @@ def test_what_is_not_known_is_not_compared() -> None:
     assert rows["k_r / s⁻¹"][1] == "–"
     assert rows["τ / s"][3] == "0.0"
     assert all(row[1] == "–" for name, row in rows.items() if name.startswith("k_e"))
+
+
+def test_what_is_at_its_bound_is_text_of_its_limit(tmp_path: Path) -> None:
+    blue = read_material("blue-paint")
+    update = {
+        "kinetic_order": 1.0, "kinetic_order_sigma": 0.02, "kinetic_order_limit_95": 1.0329,
+        "r0": 1.0, "r0_sigma": 0.01, "k_e_per_s": (0.0, *blue.states[0].k_e_per_s[1:]),
+        "k_e_per_s_sigma": (0.002,) * 8,
+    }  # fmt: skip
+    bounded = blue.model_copy(update={"states": (blue.states[0].model_copy(update=update),)})
+    path = tmp_path / "material.yaml"
+    write_material(path, bounded)
+    assert read_material(path) == bounded
+    shown = cells(describe_phosphor(read_material(path)))
+    assert shown["kinetic order b"] == "< 1.033"
+    assert shown["r(0)"] == "> 0.984"
+    k_e = [value for name, value in shown.items() if name.startswith("k_e")]
+    assert k_e[0] == "< 0.0033"
+    zero = [value == 0 for value in bounded.states[0].k_e_per_s or ()]
+    assert [value.startswith("<") for value in k_e] == zero
+    assert "kinetic order b" not in cells(describe_phosphor(blue))

@@ -40,6 +40,7 @@ def test_a_value_is_rounded_by_its_uncertainty(value: float, sigma: float, text:
         (-12345.6, 3, "−12300"),
         (1.5e-9, 2, "1.5 × 10⁻⁹"),
         (3e8, 2, "3 × 10⁸"),
+        (5e-324, 3, "4.94 × 10⁻³²⁴"),
         (9.996e-4, 3, "0.001"),
         (math.inf, 3, "–"),
     ],

@@ -64,6 +64,11 @@ def test_an_order_that_its_bound_holds_has_a_one_sided_limit(result: ExcitationR
     assert str(replace(state, kinetic_order=1.0, kinetic_order_sigma=0.02).order) == "< 1.033"
     assert str(replace(state, kinetic_order=1.1, kinetic_order_sigma=0.02).order) == "1.100(20)"
     assert replace(state, kinetic_order=1.0, kinetic_order_sigma=0.0).order.sigma == 0
+    patch = result.patches["left"]
+    for sigma, limit in ((0.02, 1.0329), (0.0, None)):
+        fit = replace(patch.fit, states=(replace(state, kinetic_order_sigma=sigma),))
+        material = excited_material(fit, result.irradiance, None, "mine", "run", ())
+        assert material.states[0].kinetic_order_limit_95 == limit
 
 
 @pytest.mark.parametrize("is_known", [True, False])

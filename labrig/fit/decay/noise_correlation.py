@@ -142,11 +142,13 @@ MIN_FRACTION = 0.1
 class _Part:
     """Part of the noise that may correlate.
 
-    `size` is its σ and `rest` the variance of the other noise, in units of all noise, shape (n,);
-    `factors` are the c that are weighed, and `log_prior` their prior log probability, shape (m,).
+    `size` is its σ where it correlates, `found` that of its scatter, where it does not, and `rest`
+    the variance of the other noise, in units of all noise, shape (n,); `factors` are the c that are
+    weighed, and `log_prior` their prior log probability, shape (m,).
     """
 
     size: FloatArray
+    found: FloatArray
     rest: FloatArray
     factors: FloatArray
     log_prior: FloatArray
@@ -155,8 +157,9 @@ class _Part:
         """Return V of the first values for every φ and c, shape (k, m, n, n)."""
         frames = np.arange(n_values)
         distance = np.abs(np.subtract.outer(frames, frames))
-        size = self.size[:n_values]
-        powers = np.power(CORRELATIONS[:, None], frames)[:, distance] * np.outer(size, size)
+        sizes = np.where(CORRELATIONS[:, None] > 0, self.size, self.found)[:, :n_values]
+        powers = np.power(CORRELATIONS[:, None], frames)[:, distance]
+        powers = powers * sizes[:, :, None] * sizes[:, None]
         scaled = self.factors[None, :, None, None] ** 2 * powers[:, None]
         return np.asarray(scaled + np.diag(self.rest[:n_values] + INDEPENDENT))
 
@@ -370,11 +373,14 @@ def _parts(
         size = flicker * brightness
         log_prior = -2 * np.log1p((flicker * FACTORS / USUAL_FLICKER) ** 2)
         rest = np.maximum(1 - (noise.flicker * brightness) ** 2, 0.0)
-        parts["flicker"] = _Part(size, rest, FACTORS, log_prior - np.log(len(FACTORS)))
+        # That there is none is judged by the scatter: one of the least size would be disproved
+        # where that is less, and so pass for one that drifts with the decay.
+        found = noise.flicker * brightness
+        parts["flicker"] = _Part(size, found, rest, FACTORS, log_prior - np.log(len(FACTORS)))
     if len(data.series.channels) == 1:
         ones = np.ones_like(brightness)
         log_prior = np.full_like(FACTORS, -np.log(len(FACTORS)))
-        parts["all"] = _Part(ones, np.zeros_like(ones), scatter * FACTORS, log_prior)
+        parts["all"] = _Part(ones, ones, np.zeros_like(ones), scatter * FACTORS, log_prior)
     return parts
 
 

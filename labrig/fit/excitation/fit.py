@@ -39,6 +39,7 @@ from labrig.results import (
     ExcitedState,
     FittedExcitation,
     Measured,
+    OneSided,
 )
 
 #: Guesses of the concentration of the brightest site, the least certain start value.
@@ -388,8 +389,12 @@ def _veil(problem: ExcitationProblem, solution: LeastSquaresFit) -> Measured | N
     place = problem.parameters.columns.veil
     if not is_fitted(place):
         return None
-    sigma = np.sqrt(solution.covariance[place.start, place.start])
-    return Measured(float(solution.parameters[place.start]), float(sigma))
+    sigma = float(np.sqrt(solution.covariance[place.start, place.start]))
+    veil = float(solution.parameters[place.start])
+    if not solution.at_bound[place.start]:
+        return Measured(veil, sigma)
+    # Rates that are at 0, too, share its light: how far it would go beyond is not known alone.
+    return OneSided.held(veil, sigma, 0.0)
 
 
 def _at_off(

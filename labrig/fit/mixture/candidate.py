@@ -4,15 +4,16 @@ Weighted expectation maximisation from several starts, then least squares from t
 the likelihood weighs the faint tails of a dye like its peak, the squared error does not.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labrig.fit.mixture.entries import StokesEntries, masked_mse, with_integral
 from labrig.fit.mixture.gaussians import Gaussians, LikelihoodFit, maximise_likelihood
-from labrig.fit.mixture.refinement import refined, refined_skewed
-from labrig.fit.nonlinear_least_squares import Ending
+from labrig.fit.mixture.refinement import NAMES, SKEWED_NAMES, refined, refined_skewed
+from labrig.fit.nonlinear_least_squares import Ending, LeastSquaresFit
 from labrig.foundation.arrays import FloatArray
 from labrig.material import ReradiationMixture
 
@@ -135,6 +136,8 @@ class Candidate:
         Masked error of expectation maximisation alone.
     iterations, refinement_iterations, converged
         Course of expectation maximisation and of the refinement.
+    at_bound
+        Numbers of components of the mixture, from 1, and names of parameters that a bound holds.
     """
 
     mixture: ReradiationMixture
@@ -142,6 +145,7 @@ class Candidate:
     iterations: int
     refinement_iterations: int
     converged: bool
+    at_bound: tuple[tuple[int, str], ...] = ()
 
 
 def likeliest(entries: StokesEntries, components: int) -> Candidate:
@@ -174,12 +178,15 @@ def candidates(
             gaussians, scale, fit = refined(entries, gaussians, scale, least_sd, is_final)
             spent += fit.iterations
         likely_mixture = with_integral(entries, _in_nm(entries, starts[0][0], 1.0))
-        mixture = _in_nm(entries, gaussians, scale)
+        mixture, weights = _in_nm(entries, gaussians, scale), gaussians.weights
+        names: Sequence[str] = NAMES
         if skewed:
+            names = SKEWED_NAMES
             medians, amount, skew, fit = refined_skewed(
                 entries, gaussians, scale, least_sd, is_final
             )
             mixture = _in_nm(entries, medians, amount, skew)
+            weights = medians.weights
             spent += fit.iterations
         yield Candidate(
             mixture,
@@ -187,8 +194,27 @@ def candidates(
             likely.iterations,
             spent,
             fit.ending is not Ending.SLOW_PROGRESS,
+            _held(fit, weights[0], names),
         )
         components += 1
+
+
+def _held(
+    fit: LeastSquaresFit, weights: FloatArray, names: Sequence[str]
+) -> tuple[tuple[int, str], ...]:
+    """Return what a bound holds, with the numbers that components have in the mixture."""
+    held = fit.at_bound.reshape(-1, len(names))[_order(weights)]
+    return tuple(
+        (number, name)
+        for number, own in enumerate(held.tolist(), start=1)
+        for name, is_held in zip(names, own, strict=True)
+        if is_held
+    )
+
+
+def _order(weights: FloatArray) -> NDArray[np.intp]:
+    """Return the components by falling weight."""
+    return np.argsort(-weights, kind="stable")
 
 
 def _least_sd(entries: StokesEntries) -> float:
@@ -253,7 +279,7 @@ def _in_nm(
 ) -> ReradiationMixture:
     unit = entries.unit_nm
     aa, ab, bb = gaussians.covariance[0].T * unit**2
-    order = np.argsort(-gaussians.weights[0], kind="stable")
+    order = _order(gaussians.weights[0])
     covariance = np.stack([np.stack([aa, ab], -1), np.stack([ab, bb], -1)], -2)
     return ReradiationMixture(
         scale * unit**2 / float(entries.output_width_nm.mean()),

@@ -249,6 +249,7 @@ def fit_mixture(
         iterations=best.iterations,
         refinement_iterations=best.refinement_iterations,
         converged=best.converged,
+        at_bound=best.at_bound,
         selection=selection if components == "auto" else "given",
         candidates=tuple(table),
     )

@@ -15,6 +15,15 @@ from labrig.foundation.arrays import FloatArray
 #: the input, rise of the output with the input, log of σ of the output at one input. They are the
 #: Cholesky factor of its covariance, whose positive definiteness they keep.
 PARAMETERS = 6
+#: Names of what a bound may hold, in this order.
+NAMES = (
+    "height",
+    "mean of the incident light",
+    "mean of the returning light",
+    "σ of the incident light",
+    "rise of the returning light with the incident",
+    "σ of the returning light",
+)
 #: Bounds in units of `StokesEntries.unit_nm`: a mean stays within the measured wavelengths, σ
 #: is no more than this, and the height no less than this times the largest entry.
 MAX_SD, MIN_HEIGHT, STEEPEST = 20.0, 1e-6, 20.0
@@ -127,6 +136,12 @@ def _gaussians(parameters: FloatArray, largest: float) -> tuple[Gaussians, float
 #: Parameters of a component: log of its height, then of input and of output the median, log of the
 #: width and skew, then artanh of the correlation.
 SKEWED_PARAMETERS = 8
+SKEWED_NAMES = (
+    "height",
+    *(f"{what} of the incident light" for what in ("median", "σ", "skew")),
+    *(f"{what} of the returning light" for what in ("median", "σ", "skew")),
+    "correlation",
+)
 
 #: Bounds: one side nine times as wide as the other, and no ridge narrower than the bands.
 MAX_SKEW, MAX_CORRELATION = np.log(3.0), 0.95

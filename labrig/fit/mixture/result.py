@@ -113,6 +113,9 @@ class MixtureFit(NotebookViews):
         Number of iterations of expectation maximisation and of the refinement.
     converged
         Whether the refinement reached a minimum.
+    at_bound
+        Numbers of components, from 1, and names of their parameters that are at the bounds of the
+        search: a mean at the end of the measured wavelengths is no peak that was seen.
     selection
         How the number of components was found: "bic", "cross-validation" or "given".
     candidates
@@ -136,6 +139,7 @@ class MixtureFit(NotebookViews):
     iterations: int
     refinement_iterations: int
     converged: bool
+    at_bound: tuple[tuple[int, str], ...]
     selection: str
     candidates: tuple[MixtureCandidate, ...]
 
@@ -184,6 +188,9 @@ class MixtureFit(NotebookViews):
             "iterations": self.iterations,
             "refinement_iterations": self.refinement_iterations,
             "converged": self.converged,
+            "at_bound": [
+                {"component": number, "parameter": name} for number, name in self.at_bound
+            ],
             "selection": self.selection,
             "candidates": [asdict(candidate) for candidate in self.candidates],
         }

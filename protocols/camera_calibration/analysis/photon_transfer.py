@@ -280,7 +280,8 @@ def _read_noise(dark: Sequence[Pair]) -> _ReadNoise:
     step_dn = max(pair.scatter.step_dn for pair in dark)
     row_variance = float(np.mean([pair.scatter.row_variance_dn2 for pair in dark]))
     counts = [each for pair in dark for each in pair.counts]
-    if not counts:
+    # Only of the quieter ones of pairs that chance divides the noise would be too low.
+    if not all(pair.counts for pair in dark):
         variance = float(np.mean([pair.scatter.variance_dn2 for pair in dark]))
         kurtosis = float(np.mean([pair.scatter.kurtosis for pair in dark]))
         pixels = sum(pair.scatter.pixels for pair in dark)

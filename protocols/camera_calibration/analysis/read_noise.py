@@ -38,6 +38,11 @@ VAGUE, UNLIKE = 0.3, 4.0
 #: Probability with which noise is below the limit.
 CONFIDENCE = 0.95
 
+#: Noise in steps from which its variance does not depend on where the levels lie, to 0.2 %.
+ANYWHERE = 0.6
+#: Error of a likelihood's noise in its σ that all counts share: a centre in the middle of a step
+#: and a width of 0 are ends of what is possible, and what chance moves them takes from the noise.
+_TOGETHER = 0.4
 #: Bounds of ln s, centre, ln width, δ in steps, and the logit of the fraction of outliers.
 _BOUNDS = ((np.log(0.02), 0.5), (-1.5, 1.5), (np.log(0.005), 0.0), (-0.5, 0.5), (-16.0, -2.0))
 #: σ of these parameters without any data, which keeps their information invertible.
@@ -134,30 +139,30 @@ def counted_noise(counts: Sequence[NumberCounts]) -> CountedNoise:
     # Those that exceed a limit by chance are no sample of all.
     if 2 * len(estimates) <= len(counts):
         return CountedNoise(_limit(counts), 0.0, is_limit=True)
-    log_s, sigma, shape = np.array(
-        [(each.log_s, each.log_sigma, each.log_shape) for each in estimates]
+    log_s, sigma, together = np.array(
+        [(each.log_s, each.log_sigma, each.log_together) for each in estimates]
     ).T
-    weight = 1 / (np.square(sigma) + np.square(shape))
+    weight = 1 / (np.square(sigma) + np.square(together))
     weight /= weight.sum()
     value = float(np.exp(weight @ log_s))
-    # All positions of the colour filter have levels of one shape.
-    relative = np.hypot(np.linalg.norm(weight * sigma), weight @ shape)
+    relative = np.hypot(np.linalg.norm(weight * sigma), weight @ together)
     return CountedNoise(value, value * float(relative))
 
 
 @dataclass(frozen=True)
 class _Estimate:
-    """ln of the noise, its σ by the number of pixels, and that by the shape of the levels."""
+    """ln of the noise, its σ by the number of pixels, and that which all counts share."""
 
     log_s: float
     log_sigma: float
-    log_shape: float = 0.0
+    log_together: float = 0.0
 
 
 def _estimate(counts: NumberCounts) -> _Estimate | None:
     """Return the noise of pixels; None where the counts set a limit only."""
-    if counts.spread >= SPREAD:
-        return _by_variance(counts)
+    by_variance = _by_variance(counts)
+    if counts.spread >= SPREAD or by_variance.log_s >= np.log(ANYWHERE):
+        return by_variance
     return None if counts.moved < STILL else _by_likelihood(counts)
 
 
@@ -248,7 +253,8 @@ def _by_likelihood(counts: NumberCounts) -> _Estimate | None:
     shape = _by_shape(float(np.exp(best[0]))) if np.exp(best[2]) > _WIDE else 0.0
     if reduced > UNLIKE or np.hypot(sigma, shape) > VAGUE:
         return None
-    return _Estimate(float(best[0]), float(sigma), shape)
+    # All positions of the colour filter have levels of one shape.
+    return _Estimate(float(best[0]), float(sigma), float(np.hypot(shape, _TOGETHER * sigma)))
 
 
 def _by_shape(noise: float) -> float:

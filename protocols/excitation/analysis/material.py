@@ -15,6 +15,7 @@ from labrig.results import (
     EmissionSpectrum,
     ExcitedState,
     FittedExcitation,
+    order_fields,
 )
 
 SOURCE = (
@@ -44,8 +45,7 @@ def excited_material(
             State(
                 k_r_per_s=state.k_r_per_s,
                 k_r_per_s_sigma=_known(state.k_r_per_s_sigma),
-                kinetic_order=state.kinetic_order,
-                kinetic_order_sigma=_known(state.kinetic_order_sigma) or None,
+                **order_fields(state.order),
                 amplitude=float(max(at_off.amplitude[number], 0.0)),
                 amplitude_sigma=_known(at_off.amplitude_sigma[number]),
                 amplitude_unit="DN/s",

@@ -147,6 +147,28 @@ def test_read_noise_is_right_or_below_a_limit_wherever_black_lies_in_a_step(
         assert not noise.read_noise_is_limit
 
 
+@pytest.mark.parametrize("noise_dn", [0.8, 1.0])
+def test_sigma_of_read_noise_is_right_of_many_pairs_whose_levels_are_half_a_step_apart(
+    noise_dn: float,
+) -> None:
+    """What all pairs share is not averaged, and pairs are not chosen by what they scatter."""
+    levels = 0.1 + 0.5 * (np.arange(SHAPE[1]) % 2) * np.ones(SHAPE)
+    bright = np.random.default_rng(1)
+    lit = [measured(frame(bright, 9000), frame(bright, 9000)) for _ in range(2)]
+    pulls = []
+    for seed in range(80):
+        rng = np.random.default_rng([21, seed])
+        found = photon_transfer(
+            100, lit, [dark_pair(rng, noise_dn, levels) for _ in range(4)], LINEAR
+        )
+        noise, gain = found.noise, found.noise.gain_e_per_dn
+        by_gain = noise.read_noise_e * noise.gain_e_per_dn_sigma / gain
+        sigma = np.sqrt(noise.read_noise_e_sigma**2 - by_gain**2)
+        pulls.append((noise.read_noise_e - noise_dn * gain) / sigma)
+    assert_sigma_is_right(pulls)
+    assert abs(np.mean(pulls)) < 0.4
+
+
 def test_numbers_in_steps_of_four_are_rounded_to_four() -> None:
     rng = np.random.default_rng(5)
     fine = dark_pair(rng, 0.8, rng.standard_normal(SHAPE))
