@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Never
 
 from labrig.foundation.clock import Clock
 from labrig.foundation.input_file import read_text
+from labrig.foundation.signals import interrupting
 from labrig.local_server import KINDS, LocalServer, RequestHandler
 from labrig.watch.run_follower import RunFollower
 
@@ -239,7 +240,7 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     follower = RunFollower(run)
     follower.look()
     news = UpdateFeed(follower.state(), follower.picture)
-    with WatchServer(news, port) as server, server.running():
+    with interrupting(clock), WatchServer(news, port) as server, server.running():
         try:
             tell(server.url)
             while True:
