@@ -42,7 +42,6 @@ def interrupting(clock: Clock) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread gets signals
         return
-    raise_again()
 
     def ask(signum: int, frame: FrameType | None) -> None:
         clock.interrupt(signum)
@@ -50,6 +49,7 @@ def interrupting(clock: Clock) -> Iterator[None]:
     old_handlers = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
     is_interrupted = False
     try:
+        raise_again()  # a signal from before, which is not asked about any more
         with _closing_console(clock):
             yield
     except Interrupted:
