@@ -253,14 +253,15 @@ def test_in_the_dark_of_a_run_it_is_released_until_the_lamp_cannot_be_made_safe(
     told: list[bool] = []
     monkeypatch.setattr(Guard, "watch", lambda self: told.append(True))
     monkeypatch.setattr(Guard, "stand_down", lambda self: told.append(False))
-    with (
-        open_bench(read_rig_file(path), str(path)) as bench,
-        pytest.raises(DeviceError, match="its guard goes on trying for 5 min"),
-        bench.devices() as devices,
-    ):
-        LightReadback(devices)
-        assert told == [True, False]
-        board.plug_in_again()
+
+    def lose_the_board_in_the_dark() -> None:
+        with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+            LightReadback(devices)
+            assert told == [True, False]
+            board.plug_in_again()
+
+    with pytest.raises(DeviceError, match="its guard goes on trying for 5 min"):
+        lose_the_board_in_the_dark()
     assert told == [True, False, True]
 
 
