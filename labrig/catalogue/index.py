@@ -1,8 +1,8 @@
 """The runs of a folder: an index of their summaries, a list through a filter, one by its name.
 
 Reading a run takes milliseconds, looking at the times and sizes of its files microseconds. The
-index is derived from the runs and may be deleted; where it cannot be written, all runs are read. One
-that another user wrote, or another version of labrig, is none: its numbers are not looked at.
+index is derived from the runs and may be deleted; where it cannot be written, all runs are read.
+One that another user wrote, or another version of labrig, is none: its numbers are not looked at.
 """
 
 import json
