@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import pytest
@@ -254,6 +255,18 @@ def test_lack_of_memory_with_the_lamp_on_ends_the_run_with_one_line(
     assert not lamp_is_on(stands[-1])
     assert [attempt.exit_status for attempt in recorded(runs).attempts] == ["success", "fail"]
     assert labrig("resume", recorded(runs).folder, "--no-process", "--edited").code == 0
+
+
+def test_a_thread_that_cannot_be_started_is_lack_of_memory(
+    labrig: Labrig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def start(thread: Thread) -> None:
+        raise RuntimeError("can't start new thread")  # as Python says it
+
+    monkeypatch.setattr(Thread, "start", start)
+    ended = labrig("rig", "view", "sim", "--no-browser", "--port", "0")
+    assert ended.code == 5
+    assert "too little memory left (can't start new thread)" in complaint(ended)
 
 
 def test_a_driver_that_lacks_memory_is_not_blamed() -> None:

@@ -20,6 +20,9 @@ NETWORK_MODEL = "PTP/IP Camera"
 #: An image, as one of the kinds of events.
 FILE_ADDED = gphoto2.GP_EVENT_FILE_ADDED
 
+#: Pause before a camera that is busy is asked again for its frame.
+BUSY_PAUSE_S = 0.02
+
 _CHOICES = (gphoto2.GP_WIDGET_RADIO, gphoto2.GP_WIDGET_MENU)
 _GROUPS = (gphoto2.GP_WIDGET_WINDOW, gphoto2.GP_WIDGET_SECTION)
 
@@ -83,9 +86,16 @@ class Session:
         deadline_s = self._clock.now() + within_s
         while True:
             remaining_s = deadline_s - self._clock.now()
-            kind, event = self._camera.wait_for_event(max(1, round(remaining_s * 1e3)))
-            if kind == FILE_ADDED:
-                return event.folder, event.name
+            try:
+                kind, event = self._camera.wait_for_event(max(1, round(remaining_s * 1e3)))
+            except gphoto2.GPhoto2Error as error:
+                # After 10 s it also asks a Canon to stay awake, which one that exposes refuses.
+                if error.code != gphoto2.GP_ERROR_CAMERA_BUSY:
+                    raise
+                self._clock.sleep(min(max(remaining_s, 0.0), BUSY_PAUSE_S))
+            else:
+                if kind == FILE_ADDED:
+                    return event.folder, event.name
             if remaining_s <= 0:
                 return None
 

@@ -1,6 +1,7 @@
 """Read-back of lights during a run, since another program or person may have switched them."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import cast
 
 from labrig.acquire.rig import Rig, device_errors
@@ -42,6 +43,9 @@ def lights_that_read_back(rig: Rig) -> dict[str, bool]:
 class LightReadback:
     """Comparison of the lights' states with those commanded, for boards that read back.
 
+    What guards the rig's lights is told whether one may be on; a light that cannot be read back may
+    be on at any time.
+
     Parameters
     ----------
     rig
@@ -49,21 +53,30 @@ class LightReadback:
     """
 
     def __init__(self, rig: Rig) -> None:
-        self._read_back = {
-            key: _LightState(rig, key)
-            for key, reads_back in lights_that_read_back(rig).items()
-            if reads_back
-        }
+        reads_back = lights_that_read_back(rig)
+        self._rig = rig
+        self._read_back = {key: _LightState(rig, key) for key, reads in reads_back.items() if reads}
+        self._all_read_back = all(reads_back.values())
+        self._release_if_dark()
 
     @property
     def is_reported(self) -> bool:
         """Whether any light can be read back."""
         return bool(self._read_back)
 
-    def asked(self, action: DeviceAction) -> None:
-        """Note an action that was begun just now."""
+    @contextmanager
+    def asking(self, action: DeviceAction) -> Iterator[None]:
+        """Note an action that is begun within the block."""
+        if action.device in LIGHTS:
+            self._rig.lights_may_be_on(True)
+        yield
         if action.device in self._read_back:
             self._read_back[action.device].asked(str(action))
+            self._release_if_dark()
+
+    def _release_if_dark(self) -> None:
+        if self._all_read_back and all(light.is_dark for light in self._read_back.values()):
+            self._rig.lights_may_be_on(False)
 
     def read_if_due(self) -> None:
         """Read every light whose last reading is `READ_PERIOD_S` or longer ago.
@@ -97,6 +110,10 @@ class _LightState:
         self._role = ROLES[key]
         self._commanded = DARK
         self._commanded_s = self._read_s = rig.clock.now()
+
+    @property
+    def is_dark(self) -> bool:
+        return self._commanded == DARK
 
     def asked(self, state: str) -> None:
         self._commanded = state

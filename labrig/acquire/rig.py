@@ -48,6 +48,8 @@ class Rig:
         self.devices = dict(devices)
         self._warm_up_s = dict(warm_up_s)
         self.connected_s = clock.now()
+        #: Called before a light is switched, and after all lights read dark.
+        self.lights_may_be_on: Callable[[bool], None] = lambda may_be: None
 
     def __getitem__(self, role: Role[DeviceT]) -> DeviceT:
         """Return the device with a role.

@@ -447,9 +447,8 @@ class Session:
                 reading = self.rig[SPECTROMETER].read(action.integration_s, action.repetitions)
             self._recorder.spectrum(action.role, reading, start_s, self.clock.now(), late_s)
         else:
-            with device_errors(action.device):
+            with self._lights.asking(action), device_errors(action.device):
                 action.begin(self.rig.device(action.device))
-            self._lights.asked(action)
         self._recorder.acted(action.device, str(action), start_s, self.clock.now(), late_s)
 
 

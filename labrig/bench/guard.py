@@ -79,6 +79,10 @@ class Guard:
         self._closed = threading.Event()
         self._beating = threading.Thread(target=self._beat, daemon=True)
 
+    def lights_may_be_on(self, may_be: bool) -> None:
+        """Report it at once; the guard is started before the first light."""
+        self.watch() if may_be else self.stand_down()
+
     def watch(self) -> None:
         """Start the guard if necessary, and report that a light may be on.
 

@@ -134,6 +134,7 @@ class Bench:
                 rig.connect(key, partial(_open, self.file, key, connections, self.source))
             if self.guard is not None:
                 self.guard.watch()
+                rig.lights_may_be_on = self.guard.lights_may_be_on
             yield rig
 
     def _make_safe(self, rig: Rig) -> None:
@@ -142,7 +143,9 @@ class Bench:
             rig.make_safe()
         except DeviceError as error:
             if self.guard is not None and not self.guard.lights.isdisjoint(error.unsafe):
-                error.args = (f"{error}; when labrig has ended, {self.guard.goes_on}",)
+                with suppress(DeviceError):  # without a guard there is nothing to add
+                    self.guard.watch()
+                    error.args = (f"{error}; when labrig has ended, {self.guard.goes_on}",)
             raise
         if self.guard is not None and self.guard.lights <= rig.devices.keys():
             self.guard.stand_down()

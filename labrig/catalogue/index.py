@@ -2,6 +2,7 @@
 
 Reading a run takes milliseconds, looking at the times and sizes of its files microseconds. The
 index is derived from the runs and may be deleted; where it cannot be written, all runs are read.
+One that another user wrote, or another version of labrig, is none: its numbers are not looked at.
 """
 
 import json
@@ -25,7 +26,7 @@ from labrig.foundation.errors import DiskError, LabrigError, UsageError
 from labrig.foundation.file_kind import RUN, require_kind, run_around
 from labrig.foundation.input_file import MAX_TEXT_BYTES, read_bytes
 from labrig.foundation.output_file import write_durably
-from labrig.record import require_plain_folder, time_made
+from labrig.record import own_digest, require_plain_folder, time_made
 from labrig.results import SUMMARY
 
 if TYPE_CHECKING:
@@ -189,10 +190,10 @@ def _measured(quantities: Mapping[str, Sequence[Any]]) -> "dict[str, Measured]":
 
 
 def _read_index(runs: Path) -> dict[str, _Entry]:
-    """Return the entries of the index; none if there is no index, a damaged or an older one."""
+    """Return the entries of the index; none if there is none of this user and this labrig."""
     try:
-        checksum, content = read_bytes(runs / FILE, MAX_TEXT_BYTES).split(b"\n", 1)
-        if checksum != _checksum(content):
+        digest, content = read_bytes(runs / FILE, MAX_TEXT_BYTES).split(b"\n", 1)
+        if digest != _digest(content):
             return {}
         index = json.loads(content)
         return {name: _Entry(**entry) for name, entry in index.items()}
@@ -204,12 +205,12 @@ def _write_index(runs: Path, entries: Mapping[str, _Entry]) -> None:
     """Write the index as a whole, so that two processes do not mix theirs; where that may be."""
     content = json.dumps({name: vars(entry) for name, entry in entries.items()}).encode()
     with suppress(DiskError):
-        write_durably(runs / FILE, _checksum(content) + b"\n" + content)
+        write_durably(runs / FILE, _digest(content) + b"\n" + content)
 
 
-def _checksum(content: bytes) -> bytes:
-    """Return a checksum that also differs from one code of the summaries to the next."""
-    return b"%08x" % crc32(content, _code_checksum())
+def _digest(content: bytes) -> bytes:
+    """Return a digest that also differs from one code of the summaries to the next."""
+    return own_digest(b"%08x" % _code_checksum() + content).encode()
 
 
 @cache

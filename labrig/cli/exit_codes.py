@@ -2,7 +2,6 @@
 
 import errno
 import re
-import signal
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -21,7 +20,7 @@ from labrig.foundation.errors import (
     memory_shortage,
 )
 from labrig.foundation.readable_output import spelled
-from labrig.foundation.signals import STOP_SIGNALS, await_signals, raise_again
+from labrig.foundation.signals import await_signals, ignore_signals, raise_again
 
 if TYPE_CHECKING:
     from typer.exceptions import TyperException
@@ -64,8 +63,7 @@ def guarded(arguments: Sequence[str]) -> int:
         code = 0  # the reader has ended with all it needs: head, less
     finally:
         DetachableStream(sys.stdout).flush()
-        for signum in STOP_SIGNALS:
-            signal.signal(signum, signal.SIG_IGN)
+        ignore_signals()
     return code
 
 
@@ -85,8 +83,13 @@ def _run(arguments: Sequence[str]) -> int:
         )
     await_signals()
     try:
-        with showing_work(arguments), checking(raise_again):
-            command()(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
+        try:
+            with showing_work(arguments), checking(raise_again):
+                words = list(arguments) or ["--help"]
+                command()(args=words, prog_name="labrig", standalone_mode=False)
+        except Exception:
+            raise_again()  # in place of what a signal's exception became
+            raise
     except Interrupted as interrupted:
         return _print_error(str(interrupted), 128 + interrupted.signum)
     except LabrigError as error:

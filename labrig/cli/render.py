@@ -12,6 +12,9 @@ from labrig.foundation.result_warning import warning_lines
 if TYPE_CHECKING:
     from labrig.reproduce import RenderFolder, Scene
 
+#: Memory below which Embree, LLVM and OpenBLAS crash while they are loaded or begin to work.
+LIBRARIES_BYTES = 700_000_000
+
 
 def render(
     scene: Annotated[
@@ -104,7 +107,10 @@ def render(
     """
     from labrig.foundation.activity import activity
     from labrig.foundation.clock import SystemClock
+    from labrig.foundation.errors import require_memory
     from labrig.foundation.quantity import duration_text
+
+    require_memory(LIBRARIES_BYTES)
     from labrig.reproduce import (
         Assumptions,
         RenderFolder,

@@ -5,10 +5,14 @@ line prints that line and ends with the class's exit code.
 """
 
 import errno
+from mmap import mmap
 from typing import ClassVar
 
 #: Messages of the loader of shared libraries that lacks memory.
 _LOADER_TEXTS = ("failed to map segment", "annot allocate memory", "cannot create shared object")
+
+#: Message of Python, which has no error of its own for it.
+_NO_THREAD = "can't start new thread"
 
 
 class LabrigError(Exception):
@@ -101,10 +105,25 @@ def memory_shortage(error: BaseException) -> MemoryShortageError:
     )
 
 
+def require_memory(size_bytes: int) -> None:
+    """Refuse to load libraries that crash where memory is short, before they are loaded.
+
+    Raises
+    ------
+    MemoryShortageError
+        This process cannot have so much more memory.
+    """
+    try:
+        mmap(-1, size_bytes).close()
+    except OSError:
+        asked = MemoryError(f"{size_bytes / 1e6:.0f} MB are needed to begin")
+        raise memory_shortage(asked) from None
+
+
 def is_memory_shortage(error: BaseException) -> bool:
-    """Return whether an error is a lack of memory, also of the system's loader of libraries."""
+    """Return whether an error is a lack of memory, also of libraries' loader or of a thread."""
     if isinstance(error, OSError):
         return error.errno == errno.ENOMEM
     if isinstance(error, ImportError):
         return any(text in str(error) for text in _LOADER_TEXTS)
-    return isinstance(error, MemoryError)
+    return isinstance(error, MemoryError) or str(error) == _NO_THREAD

@@ -49,6 +49,7 @@ def interrupting(clock: Clock) -> Iterator[None]:
     old_handlers = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
     is_interrupted = False
     try:
+        raise_again()  # a signal from before, which is not asked about any more
         with _closing_console(clock):
             yield
     except Interrupted:
@@ -122,10 +123,18 @@ def await_signals() -> None:
         signal.signal(signum, raise_interrupted)
 
 
+def ignore_signals() -> None:
+    """Let no further signal stop labrig: its answer is given, and the process is about to end."""
+    _handled.clear()
+    for signum in STOP_SIGNALS:
+        signal.signal(signum, signal.SIG_IGN)
+
+
 def raise_again() -> None:
     """Raise `Interrupted` once more if a signal was handled and its exception got lost.
 
-    Python drops an exception that is raised while it deletes an object.
+    Python drops an exception that is raised while it deletes an object, and replaces one that is
+    raised while it makes a class.
 
     Raises
     ------

@@ -112,6 +112,8 @@ def change_queue(path: Path, change: Callable[[Queue], Queue]) -> Queue:
     >>> len(queue.runs)
     1
     """
+    if path.exists():
+        read_queue(path)  # no lock is made beside a file that is none of ours
     try:
         with plain_lock(path.with_name(f".{path.name}.lock")):
             queue = change(read_queue(path) if path.exists() else Queue())

@@ -169,6 +169,7 @@ def _words(queued: QueuedRun) -> str:
 @contextmanager
 def _alone(path: Path) -> Iterator[None]:
     """Hold a queue that is being run."""
+    read_queue(path)  # no lock is made beside a file that is none of ours
     try:
         with plain_lock(path.with_name(f".{path.name}.running"), timeout_s=0):
             yield

@@ -12,6 +12,7 @@ from labrig.foundation.clock import Clock
 from labrig.foundation.errors import UsageError
 from labrig.foundation.file_kind import WISH, require_kind
 from labrig.foundation.named_files import beside
+from labrig.foundation.signals import interrupting
 from labrig.foundation.yaml_file import read_model
 from labrig.local_server import LocalServer, RequestHandler
 from labrig.studio.scene_bench import SceneBench
@@ -199,7 +200,7 @@ def design_on_page(
     folder = Path() if start is None else start.parent
     workbench = Workbench() if scene is None else SceneBench(scene, material, folder)
     first = workbench.start() if wished is None else workbench.take(wished, str(start))
-    with StudioServer(workbench, first, port) as server, server.running():
+    with interrupting(clock), StudioServer(workbench, first, port) as server, server.running():
         tell(server.url)
         while True:
             clock.sleep(CHECK_PERIOD_S)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Never
 
 from labrig.foundation.clock import Clock
 from labrig.foundation.input_file import read_bytes, read_text
+from labrig.foundation.signals import interrupting
 from labrig.local_server import KINDS, LocalServer, RequestHandler
 from labrig.record import require_plain_folder
 from labrig.watch.run_follower import RunFollower
@@ -262,7 +263,7 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     follower = RunFollower(run)
     follower.look()
     news = UpdateFeed(follower.state(), follower.picture)
-    with WatchServer(run, news, port) as server, server.running():
+    with interrupting(clock), WatchServer(run, news, port) as server, server.running():
         try:
             tell(server.url)
             while True:

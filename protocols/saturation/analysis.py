@@ -406,7 +406,8 @@ def _patch_saturation(
     levels: Iterable[Concentration] = ()
     if context.protocol.weaker is not None and weaker:
         levels = _levels(rates, charge_s, weaker[-1], full[-1], context.protocol.weaker)
-    begin, end = _growths(*(curves[units[row]] for row in full[-2:]))
+    before, last = (curves[units[row]] for row in full[-2:])
+    begin, end = (growth(before, last, fit, at_end=at_end) for at_end in (False, True))
     order = compare_levels(list(curves.values()))
     return PatchSaturation(fit, light, charge_s, curves, rates, begin, end, tuple(levels), order)
 
@@ -429,18 +430,43 @@ def _levels(
         )
 
 
-def _growths(before: Curve, last: Curve) -> Iterator[Measured]:
-    """Iterate over the relative growth of the glow between two decays, at their begin and end."""
-    count = min(len(before.value), len(last.value))
-    ratio = last.value[:count] / before.value[:count]
-    sigma = np.abs(ratio) * np.hypot(
-        last.sigma[:count] / last.value[:count], before.sigma[:count] / before.value[:count]
-    )
-    part = max(count // 4, 1)
-    for rows in (slice(None, part), slice(-part, None)):
-        weight = 1 / sigma[rows] ** 2
-        mean = float(weight @ ratio[rows] / weight.sum())
-        yield Measured(mean - 1, float(1 / np.sqrt(weight.sum())))
+def growth(before: Curve, last: Curve, fit: FittedDecay, *, at_end: bool) -> Measured:
+    """Return the relative growth of the glow between two decays, at their begin or end.
+
+    The frames of two decays are at other times. Each decay is held against a fit, and a parabola in
+    time common to both takes up by what the fit is wrong there, the noise it followed included.
+
+    Parameters
+    ----------
+    before, last
+        The decays; a quarter of the frames of each is begin or end.
+    fit
+        Fit of a decay of nearly the same shape.
+    at_end
+        Whether the end is meant.
+
+    Returns
+    -------
+    Measured
+        Growth as a fraction.
+    """
+    scales, parts = [], []
+    for is_last, curve in enumerate((before, last)):
+        count = max(len(curve.value) // 4, 2)
+        rows = slice(-count, None) if at_end else slice(None, count)
+        t_s, value, sigma = curve.t_s[rows], curve.value[rows], curve.sigma[rows]
+        model, _ = fit.signal(t_s, curve.exposure_s[rows], with_offset=True)
+        scale = float((model / sigma**2) @ value / ((model / sigma**2) @ model))
+        scales.append(scale)
+        model = scale * model
+        parts.append((np.full_like(t_s, is_last), t_s, model / sigma, (value - model) / sigma))
+    grown, t_s, over_sigma, off = (np.concatenate(each) for each in zip(*parts, strict=True))
+    x = (t_s - t_s.mean()) / np.ptp(t_s)
+    design = np.column_stack([grown, np.ones_like(x), x, x**2]) * over_sigma[:, np.newaxis]
+    covariance = np.linalg.pinv(design.T @ design)
+    more = float((covariance @ design.T @ off)[0])
+    ratio = scales[1] / scales[0]
+    return Measured(ratio * (1 + more) - 1, float(abs(ratio) * np.sqrt(covariance[0, 0])))
 
 
 def _warnings(patch: PatchSaturation) -> Iterator[ResultWarning]:

@@ -11,9 +11,10 @@ from labrig.foundation.yaml_file import read_yaml
 
 Figures = dict[str, tuple[float, float]]
 
-#: Tables of single frames, and what a run is called by: no figures. Two runs have others.
+#: Tables of single frames, values at their times, and what a run is called by: no figures. Two runs
+#: have others.
 NO_FIGURES = ("series.csv", "provenance.yaml")
-SINGLE_FRAMES = "frames"
+SINGLE_FRAMES, TIMES = "frames", "t_s"
 #: Whose σ a key is that does not say so itself.
 OF_SIGMA = {"sigma_dn_per_s": ("rate_dn_per_s",), "sigma": ("value", "bands", "fraction", "factor")}
 
@@ -63,7 +64,7 @@ def _pairs(content: Any, place: str = "") -> Iterator[tuple[str, tuple[float, fl
     if isinstance(content, list):
         for number, inner in enumerate(content):
             yield from _pairs(inner, f"{place}{number} ")
-    elif isinstance(content, Mapping):
+    elif isinstance(content, Mapping) and TIMES not in content:
         for key, inner in content.items():
             if (of := _whose(key, content)) is not None:
                 yield from _side_by_side(content[of], inner, f"{place}{of} ")

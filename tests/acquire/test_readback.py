@@ -63,6 +63,26 @@ def test_it_is_read_about_once_a_minute_and_before_it_is_switched(tmp_path: Path
     assert charging == pytest.approx([0.0, *range(60, 600, 60), CHARGE_S], abs=0.5)
 
 
+@pytest.mark.parametrize("reads_back", [True, False])
+def test_its_guard_is_released_in_the_dark_where_the_lamp_is_read_back(
+    tmp_path: Path, reads_back: bool
+) -> None:
+    clock, told = VirtualClock(), []
+    lamp = SharedLamp(clock, [])
+    lamp.tells = reads_back
+    rig = Rig("bench", clock, {"lamp": lamp}, {})
+    rig.lights_may_be_on = lambda may_be: told.append((may_be, lamp.channel_on, clock.now()))
+    folder = RunFolder.create(tmp_path, "charge", 0.0, {}, seed=1)
+    with folder:
+        run_units([Charge()], rig, folder, Watching(), {})
+    reports = [(may_be, is_on) for may_be, is_on, _ in told]
+    if reads_back:
+        assert reports == [(False, False), (True, False), (True, True), (False, False)]
+        assert [at_s for *_, at_s in told] == pytest.approx([0.0, 0.0, 600.0, 600.0], abs=0.01)
+    else:
+        assert all(may_be for may_be, _ in reports)
+
+
 @pytest.mark.parametrize(("at_s", "noticed_s"), [(100.0, 120.0), (599.0, 600.0), (700.0, 720.0)])
 def test_what_somebody_else_switched_ends_the_unit(
     tmp_path: Path, at_s: float, noticed_s: float

@@ -18,6 +18,7 @@ from labrig.protocols.saturation.analysis import (
     charged,
     compare_levels,
     compare_rates,
+    growth,
 )
 from labrig.protocols.saturation.result import Curve, PatchSaturation, SaturationResult
 from labrig.results import Measured, Series
@@ -168,17 +169,43 @@ def test_a_state_that_a_decay_lacks_has_no_rate_there() -> None:
     assert (test.own_sigma_per_s > 0).all()
 
 
+def series_of(curve: Curve) -> Series:
+    one, text = np.ones(len(curve.t_s)), ("",) * len(curve.t_s)
+    value, sigma = curve.value[:, None], curve.sigma[:, None]
+    return Series(curve.t_s, one, value, sigma, np.zeros(1), ("G",), one, one, text, text, text)
+
+
 def judged(curves: list[Curve], rates: list[float]) -> PatchSaturation:
     """Compare decays as an analysis does, the last one fitted with as many states as rates."""
-    t_s, one, text = curves[-1].t_s, np.ones(len(T_S)), ("",) * len(T_S)
-    value, sigma = curves[-1].value[:, None], curves[-1].sigma[:, None]
-    series = Series(t_s, one, value, sigma, np.zeros(1), ("G",), one, one, text, text, text)
-    growth = Measured(0.0, 0.01)
+    none = Measured(0.0, 0.01)
     return PatchSaturation(
-        fit_series(series, len(rates)), ("full",) * len(curves), np.ones(len(curves)),
+        fit_series(series_of(curves[-1]), len(rates)),
+        ("full",) * len(curves), np.ones(len(curves)),
         {str(number): curve for number, curve in enumerate(curves)},
-        compare_rates(curves, rates), growth, growth, (), compare_levels(curves),
+        compare_rates(curves, rates), none, none, (), compare_levels(curves),
     )  # fmt: skip
+
+
+def power_law(seed: int, scale: float) -> Curve:
+    """Twelve frames at times of their own, as a run takes them against a lamp that beats."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(1.0, 60.0, 5.0) + rng.uniform(0.0, 4.0, 12)
+    true = scale * (1 + t_s / 15) ** -1.3
+    sigma = 0.004 * true + 1e-4
+    noise = sigma * rng.standard_normal(12)
+    return Curve(t_s, np.zeros_like(t_s), true + noise, sigma, 0.0)
+
+
+def test_growth_is_right_whatever_the_times_of_the_frames() -> None:
+    """Power laws, which the fit of two exponentials does not assume."""
+    pulls = []
+    for seed in range(100):
+        before, last = power_law(seed, 1.0), power_law(1000 + seed, 1.03)
+        fit = fit_series(series_of(last), 2)
+        found = [growth(before, last, fit, at_end=at_end) for at_end in (False, True)]
+        pulls.append([(one.value - 0.03) / one.sigma for one in found])
+    assert np.mean(pulls, axis=0) == pytest.approx([0.0, 0.0], abs=0.3)
+    assert np.std(pulls, axis=0) == pytest.approx([1.0, 1.0], abs=0.2)
 
 
 def test_a_fall_that_no_law_describes_is_told() -> None:

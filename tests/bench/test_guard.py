@@ -13,6 +13,7 @@ import pytest
 import serial
 
 from labrig.acquire import LAMP, read_rig_file
+from labrig.acquire.readback import LightReadback
 from labrig.bench import Bench, guard as guard_module, guard_process, open_bench
 from labrig.bench.guard import ALL_OFF, MAY_BE_ON, Guard, guarding
 from labrig.foundation.errors import DeviceError
@@ -235,11 +236,33 @@ def test_it_may_go_only_when_all_lights_are_known_to_be_off(
         assert told == [MAY_BE_ON, ALL_OFF]
         with pytest.raises(DeviceError, match="its guard goes on trying for 5 min"):
             _lose_the_board(bench, board)
-        assert told == [MAY_BE_ON, ALL_OFF, MAY_BE_ON]
+        assert told == [MAY_BE_ON, ALL_OFF, MAY_BE_ON, MAY_BE_ON]
         with pytest.raises(DeviceError, match="cannot open"), bench.devices():
             pass
-        assert told == [MAY_BE_ON, ALL_OFF, MAY_BE_ON], "it may still burn"
+        assert told[3:] == [MAY_BE_ON], "it may still burn"
     stand_ins[-1].wait()
+
+
+def test_in_the_dark_of_a_run_it_is_released_until_the_lamp_cannot_be_made_safe(
+    rig: Callable[[str], Path],
+    board: BoardProcess,
+    stand_ins: list["subprocess.Popen[bytes]"],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = rig(board.address)
+    told: list[bool] = []
+    monkeypatch.setattr(Guard, "watch", lambda self: told.append(True))
+    monkeypatch.setattr(Guard, "stand_down", lambda self: told.append(False))
+
+    def lose_the_board_in_the_dark() -> None:
+        with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+            LightReadback(devices)
+            assert told == [True, False]
+            board.plug_in_again()
+
+    with pytest.raises(DeviceError, match="its guard goes on trying for 5 min"):
+        lose_the_board_in_the_dark()
+    assert told == [True, False, True]
 
 
 def _lose_the_board(bench: Bench, board: BoardProcess) -> None:

@@ -1,5 +1,6 @@
 """The list of runs: true of every protocol and at every moment, with an index or without."""
 
+import hmac
 import json
 import os
 import shutil
@@ -17,7 +18,7 @@ from labrig.acquire import ProtocolModel, read_protocol
 from labrig.catalogue import RunFilter, RunSummary, find_run, list_runs, summarise
 from labrig.foundation import resources
 from labrig.foundation.yaml_file import yaml_text
-from labrig.record import RunFolder, add_note
+from labrig.record import RunFolder, add_note, own_digest
 from labrig.results import write_fitted_decay, write_summary
 from tests.conftest import Ended
 from tests.results.made import decay_result
@@ -61,7 +62,20 @@ def as_other_code_wrote_it(run: Path) -> None:
     for entry in entries.values():
         entry["content"]["of_another_code"] = entry["content"].pop("status")
     content = json.dumps(entries).encode()
-    index.write_bytes(b"%08x\n" % crc32(content, crc32(version("labrig").encode())) + content)
+    other_code = b"%08x" % crc32(version("labrig").encode())
+    index.write_bytes(own_digest(other_code + content).encode() + b"\n" + content)
+
+
+def as_somebody_else_wrote_it(run: Path) -> None:
+    """Replace the index by one with other numbers, which holds whatever files the runs have."""
+    index = run.parent / INDEX
+    entries = json.loads(index.read_bytes().split(b"\n", 1)[1])
+    for entry in entries.values():
+        entry["stamps"] = {}
+        entry["content"]["frames"] = 4711
+    content = json.dumps(entries).encode()
+    theirs = hmac.new(b"secret of somebody else", content, "sha256").hexdigest()
+    index.write_bytes(theirs.encode() + b"\n" + content)
 
 
 def statuses(runs: Path) -> list[str]:
@@ -177,6 +191,7 @@ def rename_sample(run: Path) -> None:
         lambda run: (run.parent / INDEX).write_bytes((run.parent / INDEX).read_bytes()[:-9]),
         lambda run: (run.parent / INDEX).unlink(),
         as_other_code_wrote_it,
+        as_somebody_else_wrote_it,
     ],
 )
 def test_the_index_never_lies(tmp_path: Path, change: Callable[[Path], object]) -> None:

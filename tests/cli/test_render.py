@@ -4,6 +4,7 @@ import io
 import json
 import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -49,6 +50,23 @@ def comment(picture: Path) -> str:
     """Comment of a PNG file."""
     with Image.open(picture) as image:
         return str(image.info["Comment"])
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory are those of Linux")
+def test_lack_of_memory_is_one_line() -> None:
+    """Libraries that are written in C++ crash, where they get none."""
+    text = (
+        "import resource\n"
+        "from labrig.cli import guarded\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (500_000_000, 500_000_000))\n"
+        "raise SystemExit(guarded(['render', 'cornell-box']))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", text], capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stdout) == (5, "")
+    (line,) = ended.stderr.splitlines()
+    assert line.startswith("labrig: this PC has too little memory left (700 MB are needed to begin")
 
 
 def test_pictures_of_all_times_with_what_was_assumed(labrig: Callable[..., Ended]) -> None:

@@ -87,3 +87,30 @@ def test_while_libraries_are_imported_a_signal_ends_it_with_one_line(name: str) 
     assert ended.returncode == 128 + getattr(signal, name)
     assert ended.stderr == "labrig: interrupted\n"
     assert ended.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("moment", "then"),
+    [
+        # Python drops what is raised while it deletes an object …
+        ("__del__(self)", "Moment()\n    with interrupting(SystemClock()):\n        pass"),
+        # … and replaces what is raised while it makes a class.
+        ("__set_name__(self, *_)", "type('Made', (), {'key': Moment()})"),
+    ],
+)
+def test_a_signal_whose_exception_got_lost_is_answered(moment: str, then: str) -> None:
+    ended = python(
+        "import os, signal\n"
+        "from labrig.cli import app, guarded\n"
+        "from labrig.foundation.clock import SystemClock\n"
+        "from labrig.foundation.signals import interrupting\n"
+        "class Moment:\n"
+        f"    def {moment}:\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "def called(**_):\n"
+        f"    {then}\n"
+        "app.command = lambda: called\n"
+        "raise SystemExit(guarded([]))"
+    )
+    assert ended.returncode == 128 + signal.SIGINT
+    assert ended.stderr.splitlines()[-1] == "labrig: interrupted"

@@ -264,13 +264,18 @@ def test_what_cannot_be_is_one_line(
     assert not (tmp_path / "queue.yaml").exists()
 
 
-def test_a_queue_that_is_malformed_is_one_line(labrig: Labrig, tmp_path: Path) -> None:
-    path = tmp_path / "queue.yaml"
-    path.write_text("runs: [{protocol: decay, sett: {}}]")
-    for command in ("list", "run"):
-        ended = labrig("queue", command, "--queue", path)
-        assert (ended.code, len(ended.err.splitlines())) == (2, 1)
-        assert "queue.yaml" in ended.err
+@pytest.mark.parametrize("command", [["list"], ["run"], ["add", "decay", "--rig", "sim"]])
+@pytest.mark.parametrize("text", ["runs: [{protocol: decay, sett: {}}]", "name: decay", None])
+def test_what_is_no_queue_is_one_line_and_nothing_is_made_beside_it(
+    labrig: Labrig, tmp_path: Path, command: list[str], text: str | None
+) -> None:
+    path = tmp_path / "theirs" / "queue.yaml"
+    path.parent.mkdir()
+    path.mkdir() if text is None else path.write_text(text)
+    ended = labrig("queue", *command, "--queue", path)
+    assert (ended.code, len(ended.err.splitlines())) == (2, 1)
+    assert "queue.yaml" in ended.err
+    assert list(path.parent.iterdir()) == [path]
 
 
 values = st.lists(

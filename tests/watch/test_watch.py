@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from threading import Timer
 from urllib.parse import urlsplit
 
 import pytest
@@ -317,6 +318,28 @@ def test_the_run_is_there_as_soon_as_the_address_is_reported(growing: Growing) -
         watch_run(growing.path, 0, clock, tell)
     assert unit_states(seen[0]) == ["done", "done"]
     assert seen[0]["frame"]["name"] == "000016.dng"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signal to this process")
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_ends_it_whatever_python_is_doing(growing: Growing) -> None:
+    """Python drops an exception that is raised while it deletes an object."""
+    growing.finish()
+    clock = SystemClock()
+
+    class Deleted:
+        def __del__(self) -> None:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def tell(_: str) -> None:
+        Deleted()
+
+    late = Timer(10.0, clock.interrupt, [signal.SIGTERM])
+    late.start()
+    with pytest.raises(Interrupted) as caught:
+        watch_run(growing.path, 0, clock, tell)
+    late.cancel()
+    assert caught.value.signum == signal.SIGINT
 
 
 def test_nobody_else_gets_to_see_it(watching: Watching) -> None:

@@ -158,6 +158,12 @@ def test_busy_may_mean_that_it_has_released_all_the_same(toy: ToyBench) -> None:
         assert toy.log().count("trigger") == 2
 
 
+def test_a_camera_that_is_busy_while_its_frame_is_awaited(toy: ToyBench) -> None:
+    with toy.connected({}, {"files": [NEF], "busy_waits": 3}, clock=FastClock()) as camera:
+        camera.configure(SETTINGS)
+        assert camera.shoot().data == bytes.fromhex(NEF[1])
+
+
 @pytest.mark.campaign
 def test_a_camera_that_stays_busy(toy: ToyBench) -> None:
     with toy.connected({}, {"files": [NEF] * 4, "busy": 3}, clock=FastClock()) as camera:

@@ -37,6 +37,8 @@ class Toy:
         What each photograph delivers: pairs of name and content.
     busy
         So many triggers are answered "busy" first, although they are obeyed.
+    busy_waits
+        So many waits for an event are answered "busy" first.
     preview
         The live picture; empty where there is no live view.
     models
@@ -50,6 +52,7 @@ class Toy:
         self.stuck: list[str] = content.get("stuck", [])
         self.files: list[list[str]] = content.get("files", [])
         self.busy: int = content.get("busy", 0)
+        self.busy_waits: int = content.get("busy_waits", 0)
         self.preview = bytes.fromhex(content.get("preview", ""))
         self.models: dict[str, str] = content.get("models", {})
 
@@ -135,6 +138,9 @@ class Camera:
             raise GPhoto2Error(GP_ERROR_CAMERA_BUSY)
 
     def wait_for_event(self, _timeout_ms: int) -> tuple[int, Any]:
+        if self._toy.busy_waits:
+            self._toy.busy_waits -= 1
+            raise GPhoto2Error(GP_ERROR_CAMERA_BUSY)
         if not self._reported:
             return GP_EVENT_TIMEOUT, None
         name, content = self._reported.pop(0)
