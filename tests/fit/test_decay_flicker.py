@@ -134,7 +134,8 @@ def test_two_even_spacings_hide_their_common_period() -> None:
 @pytest.mark.parametrize("spacing", ["even", "uneven"])
 def test_the_periodogram_is_that_of_scipy(spacing: str) -> None:
     draw = np.random.default_rng(4)
-    t_s = 5.0 * np.arange(40) if spacing == "even" else np.sort(draw.uniform(0, 200, 40))
+    uneven = np.sort(draw.uniform(0, 200, 40))
+    t_s = 5.0 * np.arange(40.0) if spacing == "even" else uneven
     residuals, signal_to_noise = draw.normal(size=40), draw.uniform(1, 300, 40)
     lines = periodogram(t_s, residuals, signal_to_noise)
     assert lines is not None

@@ -63,7 +63,7 @@ def test_what_is_at_its_bound_is_text_of_its_limit(tmp_path: Path) -> None:
     blue = read_material("blue-paint")
     update = {
         "kinetic_order": 1.0, "kinetic_order_sigma": 0.02, "kinetic_order_limit_95": 1.0329,
-        "r0": 1.0, "r0_sigma": 0.01, "k_e_per_s": (0.0, *blue.states[0].k_e_per_s[1:]),
+        "r0": 1.0, "r0_sigma": 0.01, "k_e_per_s": (0.0, *(blue.states[0].k_e_per_s or ())[1:]),
         "k_e_per_s_sigma": (0.002,) * 8,
     }  # fmt: skip
     bounded = blue.model_copy(update={"states": (blue.states[0].model_copy(update=update),)})
