@@ -43,7 +43,7 @@ def html(result: NotebookViews) -> str:
     --------
     >>> import labrig
     >>> from labrig.notebook import html
-    >>> "Rate k<sub>r</sub>" in html(labrig.read_result("runs/decay"))
+    >>> "Rate <i>k</i><sub>" in html(labrig.read_result("runs/decay"))
     True
     """
     described = describe(result)

@@ -170,12 +170,7 @@ def _(fit: FittedDecay) -> tuple[Section, ...]:
 
 
 def _rows(rows: Sequence[Row]) -> tuple[tuple[str, ...], ...]:
-    return tuple((_with_unit(_symbols(row.quantity), row.unit), *row.values) for row in rows)
-
-
-def _symbols(name: str) -> str:
-    """Return a name with indices as in `k_r`, which the page sets."""
-    return str(name).replace("<sub>", "_").replace("</sub>", "")
+    return tuple((_with_unit(row.quantity, row.unit), *row.values) for row in rows)
 
 
 def _with_unit(name: str, unit: str) -> str:

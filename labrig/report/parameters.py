@@ -4,8 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from markupsafe import Markup
-
 from labrig.foundation.number_format import plus_minus, rounded
 from labrig.report.sections import Table
 from labrig.results import EXPONENTIALS, LAW_LABELS, FittedDecay, ProfileInterval, interval_rows
@@ -21,7 +19,7 @@ class Row:
     Attributes
     ----------
     quantity
-        Name of the quantity, as text or markup.
+        Name of the quantity.
     unit
         Unit of the values; empty without one.
     values
@@ -65,8 +63,8 @@ def state_rows(fit: FittedDecay, unit: str = "DN/s") -> list[Row]:
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
     amplitudes = [(state.amplitude, state.amplitude_sigma) for state in fit.states]
     return [
-        Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _value_texts(rates)),
-        Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _value_texts(lifetimes)),
+        Row("Rate k_r", "s⁻¹", _value_texts(rates)),
+        Row("Lifetime 1/k_r", "s", _value_texts(lifetimes)),
         Row("Half-life", "s", _value_texts(half_lives)),
         Row("Amplitude a", unit, _value_texts(amplitudes)),
     ]

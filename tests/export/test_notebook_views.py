@@ -18,7 +18,7 @@ from labrig.predict import Prediction
 from labrig.results import FittedExcitation, LuminanceDecay, SharedDecay, TrapDepth
 from tests.export.conftest import Finished
 
-RATE = "Rate k<sub>r</sub>"
+RATE = "Rate <i>k</i><sub><i>r</i></sub>"
 
 
 def views(finished: Finished) -> Iterator[NotebookViews]:

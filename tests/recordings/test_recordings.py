@@ -1,5 +1,6 @@
 """Results of recorded runs stay what they were, until a commit says otherwise."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -17,8 +18,24 @@ from .runs import RUNS, SLOW, Recorded
     ],
 )
 def test_results_are_those_that_were_kept(run: Recorded, tmp_path: Path) -> None:
-    different = [str(one) for one in run.differences(run.processed(tmp_path)) if one.matters]
+    result = run.processed(tmp_path)
+    different = [str(one) for one in run.differences(result) if one.matters]
     assert not different, "\n".join(["python -m tests.recordings tells all", *different[:5]])
+    assert as_a_program_writes((result / "report.html").read_text(encoding="utf-8")) == []
+
+
+def as_a_program_writes(page: str) -> list[str]:
+    """What a page shows of tags, exponents and carets, and numbers that stick to their %."""
+    for hidden in (r"<(script|style|pre|code|svg)\b.*?</\1>", r"<[^>]*>"):
+        page = re.sub(hidden, " ", page, flags=re.DOTALL)
+    return re.findall(r".{0,25}(?:&lt;/?(?:su[bp]|[bi])\b|\d[eE][-+]?\d|\^|\d%).{0,15}", page)
+
+
+def test_what_a_program_writes_is_noticed() -> None:
+    plain = "<td>k<sub>r</sub> = 3 × 10<sup>−4</sup></td><code>1e-4 ^ 5%</code>"
+    assert as_a_program_writes(plain) == []
+    for odd in ("k&lt;sub>r", "3e-4", "t^2", "5% of"):
+        assert len(as_a_program_writes(f"<td>{odd}</td>")) == 1
 
 
 @pytest.mark.parametrize(
