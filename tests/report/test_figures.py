@@ -9,12 +9,13 @@ import pytest
 
 from labrig.fit import DecayFit
 from labrig.protocols.decay.report.figures import (
+    law_figure,
     periodogram_figure,
     residual_figure,
     residual_periodogram,
     residuals,
 )
-from labrig.report.chart import Chart, Points
+from labrig.report.chart import Chart, Line, Points
 from labrig.report.chart_figure import chart_figure
 from labrig.report.decay_figures import (
     fitted_curve,
@@ -57,11 +58,12 @@ TIMINGS = [FrameTiming(f"{n}", f"decay-{n % 2}", 5.0 * n, 0.001 * n) for n in ra
         lambda: linear_decay(SERIES, FIT),
         lambda: logarithmic_decay(SERIES, FIT),
         lambda: residual_figure(SERIES, FIT),
+        lambda: law_figure(SERIES, FIT),
         lambda: periodogram_figure(LINES),
         lambda: overview_figures([patch(SERIES)])[0],
         lambda: timing_figure(TIMINGS),
     ],
-    ids=["linear", "log", "residuals", "periodogram", "overview", "timing"],
+    ids=["linear", "log", "residuals", "laws", "periodogram", "overview", "timing"],
 )
 def test_axes_are_labelled_and_inside_the_figure(make: Callable[[], Chart]) -> None:
     with figure_style():
@@ -94,6 +96,26 @@ def test_the_legend_covers_no_data(
     texts = [text.get_text() for text in legend.get_texts()]
     assert texts[:3] == ["R", "G", "B"]
     assert ("left out" in texts) == (series is FLAGGED)
+
+
+def test_laws_and_values_are_shown_over_the_chosen_law() -> None:
+    _, lower = law_figure(SERIES, FIT).panels
+    (points,) = (mark for mark in lower.marks if isinstance(mark, Points))
+    middles_s = (SERIES.t_s + SERIES.exposure_s / 2).tolist()
+    rows = [middles_s.index(t_s) for t_s in points.x]
+    assert len(rows) > len(middles_s) / 2
+    signal = FIT.predict(SERIES.t_s, SERIES.exposure_s)[:, FIT.brightest] - FIT.offset
+    values = SERIES.values[:, FIT.brightest] - FIT.offset
+    np.testing.assert_allclose(points.y, (values / signal)[rows])
+    curves = [mark for mark in lower.marks if isinstance(mark, Line) and len(mark.x) > 2]
+    chosen = [curve for curve in curves if (curve.y == 1).all()]
+    assert len(chosen) == 1
+    assert chosen[0].width_pt > max(curve.width_pt for curve in curves if curve is not chosen[0])
+    assert len(curves) == len(FIT.compared_laws) > 1
+    # All of every law within the measurement is inside the axis.
+    for curve in curves:
+        measured = curve.y[curve.x <= FIT.measured_until_s]
+        assert lower.y.low < measured.min() <= measured.max() < lower.y.high
 
 
 def test_timing_of_several_units_has_a_legend_in_the_figure() -> None:

@@ -49,13 +49,17 @@ from labrig.results import (
     Series,
 )
 
-HEIGHT_PT = 268.0
+HEIGHT_PT, UPPER_PT, LOWER_PT = 340.0, 170.0, 190.0
 #: Number of points of a curve.
 POINTS = 160
 #: End of the time axis in times of the measurement, and its first time in that of the end.
 SHOWN_SPANS, FIRST = 6.0, 1e-3
 #: Faintest and brightest end of the axis in that of the measured values.
 BELOW, ABOVE = 1e-2, 2.0
+#: Smallest and largest deviation of a law from the chosen one at the ends of the axis.
+NEAREST, WIDEST = 0.02, 0.5
+#: Part of the first light from which on the glow is nothing to compare with.
+GONE = 1e-12
 _STYLES: tuple[LineStyle, ...] = (DASHED, DASH_DOTTED, DOTTED)
 _LINES: dict[str, tuple[str, LineStyle]] = {
     EXPONENTIALS: (OTHER_CHANNELS[0], SOLID),
@@ -69,7 +73,7 @@ _SHORT = {law.name: law.short_label for law in DECAY_LAWS.values()} | {RATE_SPEC
 
 
 def law_figure(series: Series, fit: FittedDecay) -> Chart:
-    """Return the brightest channel and the curve of every law, both axes logarithmic.
+    """Return the brightest channel and the curve of every law, and below both over the chosen law.
 
     The band is between the laws that describe the data; where it alone is left, beyond three times
     the measured time, no law can be trusted by itself.
@@ -105,8 +109,44 @@ def law_figure(series: Series, fit: FittedDecay) -> Chart:
     unit = f" / ({series.value_unit})" if series.value_unit else ""
     axis = logarithmic_axis(f"Signal{unit}", low, ABOVE * brightest)
     time = logarithmic_axis(time_label(fit), float(t_s[0]) / 1.1, float(t_s[-1]) * 1.1)
-    panel = Panel(time, axis, tuple(marks), Margins(top=46.0))
-    return Chart((panel,), HEIGHT_PT, legend=tuple(legend), columns=3)
+    margins = Margins(top=46.0, bottom=UPPER_PT)
+    upper = Panel(time, axis, tuple(marks), margins, has_x_labels=False)
+    lower = _over_the_chosen_law(series, fit, time, t_s)
+    return Chart((upper, lower), HEIGHT_PT, legend=tuple(legend), columns=3)
+
+
+def _over_the_chosen_law(series: Series, fit: FittedDecay, time: Axis, t_s: FloatArray) -> Panel:
+    """Return values, laws and the band over the chosen law, on a linear axis about 1."""
+    chosen, last_s = _curve(fit, fit.law, t_s), fit.measured_until_s
+    glows = chosen > GONE * chosen.max()
+    t_s, chosen = t_s[glows], chosen[glows]
+    ratios = {law.name: _curve(fit, law.name, t_s) / chosen for law in fit.compared_laws}
+    measured = t_s <= last_s
+    farthest = max(float(np.abs(each - 1)[measured].max()) for each in ratios.values())
+    reach = min(max(1.2 * farthest, NEAREST), WIDEST)
+    forecast, later = fit.forecast(t_s), t_s >= last_s
+    low, high = (np.clip(end / chosen, 0, 2)[later] for end in (forecast.low, forecast.high))
+    marks: list[Mark] = [Band(MUTED, t_s[later], low, high)]
+    for name, ratio in ratios.items():
+        colour, style = _LINES[name]
+        inside = np.abs(ratio - 1) < 2 * reach
+        width_pt = 2.0 if name == fit.law else 1.0
+        marks.append(Line(colour, t_s[inside], ratio[inside], width_pt, style))
+    signal = fit.predict(series.t_s, series.exposure_s)[:, fit.brightest] - fit.offset
+    usable = series.usable & (signal > GONE * chosen.max())
+    values = (series.values[usable, fit.brightest] - fit.offset) / signal[usable]
+    sigma = np.hypot(series.sigma[usable, fit.brightest] / signal[usable], fit.flicker)
+    shown = (np.nan_to_num(sigma) < reach) & (np.abs(values - 1) < reach)
+    middle_s = (series.t_s + series.exposure_s / 2)[usable][shown]
+    marks += [
+        ErrorBars(INK, middle_s, values[shown], np.nan_to_num(sigma)[shown]),
+        Points(INK, middle_s, values[shown], size_pt=2.6),
+    ]
+    ends = np.array([1 - reach, 1 + reach])
+    for at_s in (last_s, FORECAST_SPANS * last_s):
+        marks.append(Line(MUTED, np.full(2, at_s), ends, 0.7, DOTTED))
+    axis = linear_axis("Over the chosen law", 1 - reach, 1 + reach, most=4)
+    return Panel(time, axis, tuple(marks), Margins(top=LOWER_PT))
 
 
 def _curve(fit: FittedDecay, law: str, t_s: FloatArray) -> FloatArray:
