@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr, stdtrit
 
 from labrig.foundation.errors import DataError
 from labrig.reduce.plane_noise import Floats
@@ -65,7 +66,8 @@ def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
     """Fit the dark level b + d·T of each channel by weighted least squares.
 
     Where the frames scatter by more than `sigma` (the camera's black level drifts), the covariance
-    is raised to the observed scatter.
+    is raised to the observed scatter, and by what its few degrees of freedom leave open: 68 % of
+    Student's t distribution are within 1.84 σ with one of them (JCGM 100:2008, G.3).
 
     Parameters
     ----------
@@ -115,6 +117,8 @@ def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
         )
         misfit = (level[:, channel] - design @ coefficients[channel, :terms]) / sigma[:, channel]
         scatter = float(misfit @ misfit) / dof if dof else 1.0
+        if scatter > 1:
+            scatter *= float(stdtrit(dof, ndtr(1.0))) ** 2
         covariance[channel, :terms, :terms] = inverse * max(scatter, 1.0)
     return DarkModel(
         base=coefficients[:, 0],

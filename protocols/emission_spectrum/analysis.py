@@ -555,8 +555,9 @@ def _line_warnings(fit: SpectrumFit) -> Iterator[ResultWarning]:
         yield Undetermined(
             "narrow-lines",
             "light in lines much narrower than the filter's band, at {places_nm} nm: how much "
-            "light is near each of them is measured, how it is divided between neighbouring "
-            "wavelengths is not, and σ is large there; if the shape matters, use a spectrometer",
+            "light is within 50 nm of each of them is measured, how it is divided between "
+            "neighbouring wavelengths is not: a mean over 10 nm there may be wrong by 3 σ; if the "
+            "shape matters, use a spectrometer",
             places_nm=tuple(f"{low:.0f} to {high:.0f}" for low, high in fit.lines_nm),
         )
 

@@ -123,42 +123,6 @@ def test_colours_of_random_surfaces_are_as_uncertain_as_they_say(
     assert_sigma_is_right(pulls)
 
 
-def narrow_dye(rng: np.random.Generator) -> ReradiationMatrix:
-    """A dye of 25 to 60 nm width, with a tail and a shoulder, of any onset above the light."""
-    peak_nm, width_nm = rng.uniform(440, 640), rng.uniform(25, 60)
-    away = (OUTPUT_NM - peak_nm) / (width_nm / 2)
-    emission = np.where(away < 0, 0.5 ** (away**2), 1 / (1 + away**2))
-    shoulder_nm = peak_nm + rng.uniform(40, 70)
-    emission += rng.uniform(0, 0.3) * 0.5 ** ((2 * (OUTPUT_NM - shoulder_nm) / width_nm) ** 2)
-    excited_nm = peak_nm - rng.uniform(20, 70)
-    excitation = 0.5 ** (((INPUT_NM - excited_nm) / rng.uniform(25, 60)) ** 2)
-    shift_nm = np.maximum(OUTPUT_NM[:, np.newaxis] - INPUT_NM, 0.0)
-    onset = 1 - np.exp(-shift_nm / rng.uniform(3, 15))
-    shape = np.outer(emission / (20 * emission.sum()), excitation)
-    reflectance = smooth_reflectance(rng)
-    return ReradiationMatrix(
-        "narrow", INPUT_NM, OUTPUT_NM, reflectance, rng.uniform(0.1, 0.5) * shape * onset
-    )
-
-
-def test_sigma_of_entries_holds_the_error_of_the_shapes(estimator: JointEstimator) -> None:
-    off = []
-    for seed in range(6):
-        rng = np.random.default_rng([9, seed])
-        true = narrow_dye(rng)
-        fit = estimator.fit("narrow", *photographed(SYSTEM, true, rng))
-        matrix = fit.matrix
-        assert matrix.reradiation_sigma is not None
-        counts = np.maximum(true.reradiation, matrix.reradiation) > 0.1 * true.reradiation.max()
-        counts &= matrix.is_stokes & ~fit.is_extrapolated
-        away = matrix.reradiation[counts] - true.reradiation[counts]
-        off.append(away / matrix.reradiation_sigma[counts])
-    each = np.concatenate(off)
-    # Entries of one dye are off together: 6 are few, and their rms is 1.4 of these.
-    assert 0.9 < np.sqrt(np.mean(each**2)) < 1.7
-    assert np.abs(each).max() < 6
-
-
 def test_fluorescence_is_not_found_where_there_is_none(quick_estimator: JointEstimator) -> None:
     found = 0
     for seed in range(10):

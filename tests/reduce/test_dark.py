@@ -38,14 +38,32 @@ def test_uncertainty_covers_the_truth() -> None:
 def test_frames_that_scatter_more_than_they_say_count_less() -> None:
     level = np.array([[1.0], [3.0], [1.0], [3.0]])
     _, sigma = fit_dark(np.ones(4), level, np.full((4, 1), 0.01)).dark_level(1.0)
-    assert sigma == pytest.approx(np.std(level, ddof=1) / 2)
+    # 68.27 % of Student's distribution with three degrees of freedom are within 1.197.
+    assert sigma == pytest.approx(1.197 * np.std(level, ddof=1) / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("exposures_s", [(1.0, 2.0, 4.0), (1.0, 1.0, 4.0, 4.0, 16.0, 16.0)])
+def test_sigma_of_a_level_that_drifts_is_that_of_so_few_frames(
+    exposures_s: tuple[float, ...],
+) -> None:
+    """A drift three times the frames' σ; 68 % of the errors are within σ, 1.2 % of 1500 apart."""
+    exposure_s, within = np.array(exposures_s), []
+    for seed in range(1500):
+        rng = np.random.default_rng([41, len(exposures_s), seed])
+        level = 0.2 + 0.01 * exposure_s[:, None]
+        level = level + 0.03 * rng.standard_normal(level.shape)
+        model = fit_dark(exposure_s, level, np.full(level.shape, 0.01))
+        value, sigma = model.dark_level(exposures_s[-1])
+        within.append(abs(value[0] - 0.2 - 0.01 * exposures_s[-1]) < sigma[0])
+    assert np.mean(within) == pytest.approx(0.683, abs=0.04)
 
 
 def test_one_exposure_holds_there_only() -> None:
     model = fit_dark(np.array([2.0, 2.01]), np.array([[5.0], [7.0]]), np.ones((2, 1)))
     level, sigma = model.dark_level(2.0)
     assert (level[0], model.only_exposure_s) == (6, 2.005)
-    assert sigma[0] == pytest.approx(1.0)  # √(1/2), raised by χ² = 2 of one degree of freedom
+    # √(1/2), raised by χ² = 2 of one degree of freedom, of which 68.27 % are within 1.837.
+    assert sigma[0] == pytest.approx(1.837, rel=1e-3)
     with pytest.raises(DataError, match=r"got only 2\.005 s"):
         model.dark_level(4.0)
 

@@ -276,7 +276,9 @@ def _half_figures(
     if not patch.dyes:
         return reflectance, values
     unlit = np.where(patch.is_extrapolated, np.nan, matrix.reradiation)
-    emission = spectra_chart(emission_spectra(replace(matrix, reradiation=unlit)), RETURNING)
+    # Single numbers have no σ that holds: their errors are those of the shapes that were assumed.
+    drawn = replace(matrix, reradiation=unlit, reradiation_sigma=None)
+    emission = spectra_chart(emission_spectra(drawn), RETURNING)
     return (
         Picture(
             f"{slug}-matrix",
@@ -287,7 +289,7 @@ def _half_figures(
         Picture(
             f"{slug}-emission",
             emission,
-            "Emission: columns of the matrix, by incident wavelength; bands: ± 1 σ.",
+            "Emission: columns of the matrix, by incident wavelength.",
         ),
         Picture(
             f"{slug}-excitation",
@@ -302,8 +304,8 @@ def _half_figures(
 
 def _methods_note(patch: FluorescentPatch) -> str:
     note = (
-        "Re-radiation under each light that excites the sample. Band: ± 1 σ of all LEDs together; "
-        "one LED by itself, the thesis's method, has no σ."
+        "Re-radiation under each light that excites the sample, by all LEDs together and by one "
+        "LED by itself, the thesis's method."
     )
     if patch.direct is None:
         return note
@@ -333,6 +335,15 @@ def _text(patch: FluorescentPatch) -> Iterator[str]:
         )
     elif not patch.dyes:
         yield "The values are those of a surface that only reflects."
+    else:
+        yield (
+            "Colours, excitation and all light that comes back have σ. A single number of the "
+            "matrix has none: how emission is divided between wavelengths that a camera's channels "
+            "hardly tell apart follows from the shapes that emissions are assumed to have. What "
+            "the matrix's files state beside a number is the spread of surfaces that explain the "
+            "values alike; its error may be twice as large, and more where two dyes are seen as "
+            "one."
+        )
     if np.isfinite(patch.reduced_chi2):
         yield f"Reduced χ² of the values: {patch.reduced_chi2:.2f}."
     if patch.mixture is not None:

@@ -144,14 +144,10 @@ def methods_charts(patch: FluorescentPatch) -> dict[str, Chart]:
 
 
 def _methods_chart(each: ReradiationUnderLight) -> Chart:
-    nm, joint, sigma = each.joint.output_nm, BAND_NM * each.joint.value, each.joint.sigma
+    nm, joint = each.joint.output_nm, BAND_NM * each.joint.value
     per_led = BAND_NM * each.per_led.value
     marks: list[Mark] = [Line(RULE, nm[[0, -1]], np.zeros(2))]
     shown = [joint, per_led]
-    if sigma is not None:
-        low, high = joint - BAND_NM * sigma, joint + BAND_NM * sigma
-        marks.append(Band(MUTED, nm, low, high))
-        shown.append(high)
     marks += [Line(PER_LED, nm, per_led, style=DASHED), Line(INK, nm, joint)]
     if each.direct is not None:
         direct_nm, value, error = _certain(each.direct)
