@@ -1,14 +1,16 @@
-"""The run of another user, who lets this one read it, or not all of it: one line for each command.
-
-Who runs the tests as root has all rights, and gives them away first.
-"""
+"""Runs that another labrig is writing, or that another user owns: one line for each command."""
 
 import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from labrig.record import RunFolder
+from tests.conftest import Ended
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no such modes of files")
 
@@ -27,7 +29,19 @@ COMMANDS = [
 ]
 
 
+def test_a_run_that_is_being_recorded_is_analysed_as_far_as_it_is(
+    labrig: Callable[..., Ended], finished: Path
+) -> None:
+    shutil.rmtree(finished / "result")
+    with RunFolder(finished):
+        ended = labrig("process", finished)
+    assert ended.code == 0
+    assert ended.err.splitlines()[0].startswith("note: this run is being recorded")
+    assert "being recorded" not in labrig("process", finished).err
+
+
 def test_what_another_user_owns_is_left_alone(finished: Path, tmp_path: Path) -> None:
+    """Who runs the tests as root has all rights, and gives them away first."""
     text = (
         "import shlex, sys\n"
         "from labrig.cli import guarded\n"
