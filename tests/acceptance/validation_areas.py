@@ -51,6 +51,7 @@ AREAS: dict[str, tuple[str, ...]] = {
         *("faults_at_any_moment", "kills_in_every_protocol", "disk_failures", "devices_vanish"),
         *("lamp_off_however_it_ends", "suspended", "announced_end", "two_labrigs", "long_run"),
         *("edited_journals", "hostile_files", "mutated_files", "file_grammars", "ptp_fuzz"),
+        *("serial_fuzz", "real_time"),
     ),
 }
 
