@@ -79,6 +79,11 @@ class Guard:
         self._closed = threading.Event()
         self._beating = threading.Thread(target=self._beat, daemon=True)
 
+    @property
+    def is_started(self) -> bool:
+        """Whether a light may have been lit since the devices were opened."""
+        return self._process is not None
+
     def lights_may_be_on(self, may_be: bool) -> None:
         """Report it at once; the guard is started before the first light."""
         self.watch() if may_be else self.stand_down()

@@ -142,10 +142,12 @@ class Bench:
         try:
             rig.make_safe()
         except DeviceError as error:
-            if self.guard is not None and not self.guard.lights.isdisjoint(error.unsafe):
+            guard = self.guard
+            # Where no light was lit yet, there is none, and a next labrig needs the port.
+            if guard and guard.is_started and not guard.lights.isdisjoint(error.unsafe):
                 with suppress(DeviceError):  # without a guard there is nothing to add
-                    self.guard.watch()
-                    error.args = (f"{error}; when labrig has ended, {self.guard.goes_on}",)
+                    guard.watch()
+                    error.args = (f"{error}; when labrig has ended, {guard.goes_on}",)
             raise
         if self.guard is not None and self.guard.lights <= rig.devices.keys():
             self.guard.stand_down()

@@ -14,6 +14,7 @@ from .run_summary import (
     STATUSES as STATUSES,
     RunStatus as RunStatus,
     RunSummary as RunSummary,
+    is_being_written as is_being_written,
     status_of as status_of,
 )
 from .summarising import (

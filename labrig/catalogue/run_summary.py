@@ -110,7 +110,25 @@ def status_of(record: "RunRecord", *, is_complete: bool) -> RunStatus:
 
 
 def is_being_written(folder: Path) -> bool:
-    """Whether a process has the run open for writing."""
+    """Return whether a process has a run open for writing.
+
+    Parameters
+    ----------
+    folder
+        Run folder.
+
+    Returns
+    -------
+    bool
+        Whether it is being written; False for the run of another user, where nobody can tell.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import is_being_written
+    >>> is_being_written(Path("runs/decay"))
+    False
+    """
     from filelock import Timeout
 
     from labrig.foundation.file_lock import plain_lock

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from labrig.acquire import read_run_protocol
 from labrig.catalogue.run_summary import RunStatus, RunSummary, status_of, utc
-from labrig.foundation.errors import DataError, DiskError, LabrigError
+from labrig.foundation.errors import LabrigError
 from labrig.record import plan_content, read_run, time_made
 from labrig.results import fits_by_folder, headline_values, read_fitted_decay, read_summary
 
@@ -35,7 +35,7 @@ def summarise(folder: Path) -> RunSummary:
     made = time_made(folder)
     try:
         record = read_run(folder)
-    except (DataError, DiskError):
+    except LabrigError:  # damaged, or another user's
         has_journal = (folder / "journal.jsonl").exists()
         status: RunStatus = "damaged" if has_journal else "interrupted"
         return RunSummary(folder, sample, protocol, made, None, status, 0, number, 0, {}, {})
@@ -49,7 +49,7 @@ def summarise(folder: Path) -> RunSummary:
             place: read_fitted_decay(path).parameters
             for place, path in fits_by_folder(folder / "result").items()
         }
-    except DataError:
+    except LabrigError:
         status, parameters = "damaged", {}
     return RunSummary(
         folder=folder,

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Largest number of characters of a file name in a message.
 MAX_SHOWN = 200
+#: What a device or a file names may be no text, or move the terminal's cursor.
+_SHOWN = {number: repr(chr(number))[1:-1] for number in (*range(32), *range(127, 160))}
 #: Surrogates, to which Python decodes bytes of an argument that are not UTF-8.
 _NO_TEXT = re.compile("[\ud800-\udfff]")
 _SET_LOCALE = "set a locale with UTF-8, such as LC_ALL=C.UTF-8"
@@ -175,5 +177,5 @@ def _print_shortage(error: Exception) -> int:
 
 
 def _print_error(text: str, code: int) -> int:
-    note(f"labrig: {' '.join(text.split())}")
+    note(f"labrig: {' '.join(text.split()).translate(_SHOWN)}")
     return code

@@ -167,7 +167,7 @@ def process(
     region or a calibration that it depends on is another one.
     """
     from labrig.analyse import Overrides, verify_frames
-    from labrig.catalogue import find_run
+    from labrig.catalogue import find_run, is_being_written
     from labrig.record import discard_cache, read_run
 
     options = context.meta.get(GIVEN, {})
@@ -175,6 +175,8 @@ def process(
         Overrides.parse(roi or [], exclude or [], camera, optics or [], options), edited=edited
     )
     folder = find_run(run, runs)
+    if is_being_written(folder):
+        echo("note: this run is being recorded; so far only its complete units count", err=True)
     if verify:
         discard_cache(folder)
         echo(verify_frames(read_run(folder), overrides), err=True)

@@ -5,6 +5,7 @@ file or link that somebody planted is followed or overwritten. They are on the d
 takes the place of what was there.
 """
 
+import errno
 import os
 import secrets
 import stat
@@ -43,6 +44,8 @@ class RealDisk:
 REAL_DISK: Disk = RealDisk()
 #: Ending of files that are being written; a crash may leave one.
 PART = ".part"
+#: Errors of a folder of somebody else, or of a disk for reading alone.
+_REFUSED = {errno.EACCES, errno.EPERM, errno.EROFS}
 #: Permissions of a file and of a folder that their owner alone can read.
 OWN_FILE, OWN_FOLDER = 0o600, 0o700
 
@@ -113,11 +116,12 @@ def _draft_of(path: Path, ending: str) -> Iterator[Path]:
     except OSError as error:
         reason = error.strerror or error
         folder = path.parent
-        remedy = (
-            "see that the disk is there and has room"
-            if folder.exists()
-            else f"there is no folder {folder}: make it, or write elsewhere"
-        )
+        if error.errno in _REFUSED:
+            remedy = "write elsewhere, or ask for the right to write there"
+        elif folder.exists():
+            remedy = "see that the disk is there and has room"
+        else:
+            remedy = f"there is no folder {folder}: make it, or write elsewhere"
         raise DiskError(f"{path}: cannot be written ({reason}); {remedy}") from None
     finally:
         with suppress(OSError):

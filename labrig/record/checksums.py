@@ -193,7 +193,9 @@ def _checked_state(frame: FileRecord) -> _State | str:
     except (OSError, LabrigError) as error:
         if not frame.path.exists():
             return "is missing"
-        return f"cannot be read ({getattr(error, 'strerror', None) or error})"
+        if isinstance(error, LabrigError):
+            return str(error).removeprefix(f"{frame.path}: ")
+        return f"cannot be read ({error.strerror})"
     return "was changed after the run (its checksum differs)"
 
 

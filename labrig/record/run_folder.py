@@ -128,7 +128,8 @@ class RunLock:
             ) from None
         except OSError as error:
             raise DiskError(
-                f"{path.parent}: the run cannot be written to ({error.strerror})"
+                f"{path.parent}: the run cannot be written to ({error.strerror}); see that its "
+                "disk has room, or copy it to a folder of your own"
             ) from None
         content = {"pid": os.getpid(), "host": socket.gethostname(), "since": SystemClock().wall()}
         with suppress(DiskError):  # it only helps others

@@ -237,6 +237,8 @@ CAMPAIGNS = {
         _module("edited_journals"),
         _module("hostile_files", "--every", "30"),
         _module("ptp_fuzz", "--cases", "10000", "--seed", "4"),
+        _module("serial_fuzz"),
+        _module("real_time", "stopped", "--trials", "6", "--seconds", "60"),
         _module("two_labrigs", "--trials", "40"),
         _module("suspended", "--trials", "20"),
         _module("announced_end", "--cuts", "200"),

@@ -205,7 +205,8 @@ def stopped(folder: Path, rng: random.Random, seconds: float, *, in_charge: bool
         wait_for_guards(folder)
         resumed, said = (labrig.resume(), labrig.said) if code else (0, "")
         wait_for_guards(folder)
-    assert labrig.run is not None
+    if labrig.run is None:
+        return f"nothing was recorded, exit code {code}: {labrig.said[-300:]}"
     record = read_run(labrig.run)
     frames = [frame for attempt in record.attempts for frame in attempt.frames]
     lit = f"off after {off_s[0]:.1f} s" if was_lit and off_s else "was off"

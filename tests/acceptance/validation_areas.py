@@ -52,6 +52,7 @@ AREAS: dict[str, tuple[str, ...]] = {
         *("lamp_off_however_it_ends", "suspended", "announced_end", "two_labrigs", "long_run"),
         "reduced_ahead",
         *("edited_journals", "hostile_files", "mutated_files", "file_grammars", "ptp_fuzz"),
+        *("serial_fuzz", "real_time"),
     ),
 }
 

@@ -399,14 +399,15 @@ FIGURES = (
         figure.wrong,
     ),
     Figure(
-        "kill -9 at random moments of six of the shipped protocols and of the making of their "
+        "kill -9 at 216 random moments of six of the shipped protocols and of the making of their "
         "results; resumed until complete, compared with an undisturbed run",
         "kills_in_every_protocol",
         figure.kills,
     ),
     Figure(
         "An I/O error or a loss of power at every third write, fsync, close, rename … of a run and "
-        "of the making of its result; the run is resumed",
+        "of the making of its result, a disk that is full after a random number of bytes, or for "
+        "reading alone from then on; the run is resumed",
         "disk_failures",
         figure.disk,
     ),
@@ -417,7 +418,7 @@ FIGURES = (
     ),
     Figure(
         "Matrices in BFC and ARK files, camera curves and linear OpenEXR pictures by grammars of "
-        "which some rules are broken, 20 000 of each: refused with one line, or read",
+        "which some rules are broken, 100 000 of each: refused with one line, or read",
         "file_grammars",
         figure.went_wrong,
     ),
@@ -455,6 +456,18 @@ FIGURES = (
         "Damaged PTP containers over USB, 10 000 each way: no hang, no traceback",
         "ptp_fuzz",
         figure.containers,
+    ),
+    Figure(
+        "Answers of boards that come to harm on their serial line, nine drivers, 10 000 cases "
+        "each: an action that hangs, no clear error, a light that is on and is called off",
+        "serial_fuzz",
+        figure.went_wrong,
+    ),
+    Figure(
+        "labrig with a served camera in real time, stopped for a minute in turns in the charge and "
+        "in the decay: the guard ends it where the lamp burns, and it goes on where none does",
+        "real_time",
+        figure.went_wrong,
     ),
     Figure(
         "Two labrigs on one relay board, by its path, a link, a relative path, two slashes, "

@@ -215,13 +215,9 @@ def test_a_rig_without_lights_has_no_guard(tmp_path: Path) -> None:
         assert bench.guarded_by.startswith("nothing")
 
 
-def test_it_may_go_only_when_all_lights_are_known_to_be_off(
-    rig: Callable[[str], Path],
-    board: BoardProcess,
-    stand_ins: list["subprocess.Popen[bytes]"],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    path = rig(board.address)
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """All that a guard is told."""
     told: list[bytes] = []
     tell = Guard._tell
 
@@ -230,6 +226,16 @@ def test_it_may_go_only_when_all_lights_are_known_to_be_off(
         tell(self, state)
 
     monkeypatch.setattr(Guard, "_tell", noted)
+    return told
+
+
+def test_it_may_go_only_when_all_lights_are_known_to_be_off(
+    rig: Callable[[str], Path],
+    board: BoardProcess,
+    stand_ins: list["subprocess.Popen[bytes]"],
+    told: list[bytes],
+) -> None:
+    path = rig(board.address)
     with open_bench(read_rig_file(path), str(path)) as bench:
         with bench.devices() as devices:
             devices[LAMP].on()
@@ -247,22 +253,38 @@ def test_in_the_dark_of_a_run_it_is_released_until_the_lamp_cannot_be_made_safe(
     rig: Callable[[str], Path],
     board: BoardProcess,
     stand_ins: list["subprocess.Popen[bytes]"],
-    monkeypatch: pytest.MonkeyPatch,
+    told: list[bytes],
 ) -> None:
     path = rig(board.address)
-    told: list[bool] = []
-    monkeypatch.setattr(Guard, "watch", lambda self: told.append(True))
-    monkeypatch.setattr(Guard, "stand_down", lambda self: told.append(False))
 
     def lose_the_board_in_the_dark() -> None:
         with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
             LightReadback(devices)
-            assert told == [True, False]
+            assert told == [MAY_BE_ON, ALL_OFF]
             board.plug_in_again()
 
     with pytest.raises(DeviceError, match="its guard goes on trying for 5 min"):
         lose_the_board_in_the_dark()
-    assert told == [True, False, True]
+    assert told == [MAY_BE_ON, ALL_OFF, MAY_BE_ON]
+    stand_ins[-1].wait()
+
+
+def test_a_board_that_never_answered_is_left_alone(
+    rig: Callable[[str], Path], told: list[bytes], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody has lit its lamp, and the next labrig needs the port."""
+    monkeypatch.setattr("labrig.acquire.rig.PATIENCE_S", 0.1)
+    ends = os.openpty()
+    path = rig(os.ttyname(ends[1]))
+    with (
+        open_bench(read_rig_file(path), str(path)) as bench,
+        pytest.raises(DeviceError, match=r"not confirmed; switch off by hand: .*address$"),
+        bench.devices(),
+    ):
+        pass
+    for end in ends:
+        os.close(end)
+    assert told == []
 
 
 def _lose_the_board(bench: Bench, board: BoardProcess) -> None:

@@ -172,6 +172,12 @@ def rename_sample(run: Path) -> None:
     (run / "protocol.yaml").write_text(text.replace("blue-paint", "teal-paint"))
 
 
+def hide_journal(run: Path) -> None:
+    """Make it unreadable, as that of another user is; root may read everything but a folder."""
+    (run / "journal.jsonl").unlink()
+    (run / "journal.jsonl").mkdir()
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -182,6 +188,7 @@ def rename_sample(run: Path) -> None:
         lambda run: (run / "result" / "fit.json").write_text("{}"),
         lambda run: (run / "journal.jsonl").write_text("{]\n{}\n"),
         lambda run: (run / "journal.jsonl").unlink(),
+        hide_journal,
         lambda run: write_summary(run / "result", ["another result"]),
         lambda run: (run / "made.txt").write_text("2001-01-01T00:00:00+00:00\n"),
         rename_sample,

@@ -132,6 +132,13 @@ def test_an_option_of_another_kind_is_told_plainly(
     one_line(labrig("process", finished, "--states", value), 2, "--states", expected)
 
 
+def test_what_is_named_in_an_error_cannot_move_the_cursor(labrig: Labrig) -> None:
+    ended = labrig("runs", "show", "\x1b[2J\x07runs")
+    assert ended.code == 2
+    assert r"\x1b[2J\x07runs" in ended.err
+    assert ended.err.rstrip("\n").isprintable()
+
+
 @pytest.mark.parametrize("command", [["resume"], ["process"]])
 def test_what_is_no_run_folder(labrig: Labrig, tmp_path: Path, command: list[str]) -> None:
     one_line(labrig(*command, tmp_path), 2, "expected a run folder")
