@@ -90,7 +90,7 @@ class Arrangements:
     Attributes
     ----------
     since_s
-        Begin of each state on the room's clock in seconds, rising, the first at 0.
+        Start of each state on the room's clock in seconds, rising, the first at 0.
     states
         State of the bench since each of these times.
     """

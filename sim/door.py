@@ -111,7 +111,7 @@ class DoorDrive:
     settings
         Settings of the door.
     is_open
-        Whether the door is open at the begin.
+        Whether the door is open at the start.
     pulses
         Function that returns the pulses that the servo has been sent up to now.
     jitter_s

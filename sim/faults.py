@@ -16,7 +16,7 @@ class FaultTime(FrozenModel):
     Attributes
     ----------
     at
-        Begin of the fault after the epoch that the rig file gives, for example `25 min`. The room
+        Start of the fault after the epoch that the rig file gives, for example `25 min`. The room
         of a resumed run opens later than that epoch, so that a past fault stays past.
     lasting
         Duration of the fault, `for` in YAML, for example `20 s`; null: it lasts for ever.

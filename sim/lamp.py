@@ -120,7 +120,7 @@ def _settling(begin_k: float, powered: bool) -> BSpline:
 class _Phase:
     """Time from one switch to the next, from `start_s` on.
 
-    `begin_k` is the filament's temperature at its begin, `warmth` the housing's, 0 cold to 1 warm;
+    `begin_k` is the filament's temperature at its start, `warmth` the housing's, 0 cold to 1 warm;
     `glowing` the fraction of the afterglow, 0 to 1.
     """
 

@@ -164,7 +164,7 @@ class Leds:
         return bisect_right(self.states, time_s, key=lambda state: state[0]) - 1
 
     def _lit(self, state: int) -> Iterator[tuple[Banked, float, FloatArray, FloatArray]]:
-        """Yield the LEDs of a state: warmth at its begin, light of the cold and of the warm one."""
+        """Yield the LEDs of a state: warmth at its start, light of the cold and of the warm one."""
         for led in self.members:
             if led.relay in self.states[state][1]:
                 brightness = self._brightness(led.relay, self.states[state][0])
@@ -184,7 +184,7 @@ class Leds:
 
     @cached_property
     def _warmth(self) -> list[dict[int, float]]:
-        """Warmth of each LED at the begin of each state, from 0 to 1."""
+        """Warmth of each LED at the start of each state, from 0 to 1."""
         warmth = [{led.relay: 0.0 for led in self.members}]
         for (since_s, relays), (until_s, _) in pairwise(self.states):
             warmth.append({})

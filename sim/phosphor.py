@@ -272,9 +272,9 @@ class _Step:
     Attributes
     ----------
     factor
-        Level and exposure at the step's end per level at its begin.
+        Level and exposure at the step's end per level at its start.
     added
-        Level and exposure at the step's end for a level of 0 at its begin.
+        Level and exposure at the step's end for a level of 0 at its start.
     """
 
     factor: FloatArray

@@ -40,7 +40,7 @@ def _collocation() -> tuple[FloatArray, FloatArray]:
 
 NODES, INTEGRALS = _collocation()
 WEIGHTS: FloatArray = INTEGRALS[-1]
-#: From values at the nodes, less that at the begin, to their derivatives.
+#: From values at the nodes, less that at the start, to their derivatives.
 DERIVATIVES: FloatArray = np.asarray(np.linalg.inv(INTEGRALS), dtype=np.float64)
 
 
@@ -74,7 +74,7 @@ def integrate(
     law
         Law of all these traps.
     state : ndarray, shape (2, traps)
-        Filled fractions n at the begin, and ∫ visible emission dt up to there.
+        Filled fractions n at the start, and ∫ visible emission dt up to there.
     begin_s, stop_s
         The interval.
     drive

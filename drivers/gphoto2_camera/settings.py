@@ -21,7 +21,7 @@ class Gphoto2CameraSettings(FrozenModel):
     Attributes
     ----------
     shutter_lag
-        Time from the release that the camera obeyed to the begin of the exposure, for example
+        Time from the release that the camera obeyed to the start of the exposure, for example
         `60 ms`; to be measured.
     release
         Way to release the shutter. `button` sends half and full press apart, so that nothing but

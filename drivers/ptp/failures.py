@@ -32,7 +32,7 @@ class MalformedError(DeviceError):
     Parameters
     ----------
     expected
-        Begin of the message: the expected bytes.
+        Start of the message: the expected bytes.
     received
         Bytes that came instead.
     remedy

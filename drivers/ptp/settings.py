@@ -18,7 +18,7 @@ class PtpCameraSettings(FrozenModel):
     Attributes
     ----------
     shutter_lag
-        Time from the release to the begin of the exposure, as `labrig rig check` measures it, for
+        Time from the release to the start of the exposure, as `labrig rig check` measures it, for
         example `60 ms`.
     isos
         Native ISO sensitivities of the sensor. The camera's others, which are gain after

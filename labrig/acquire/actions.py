@@ -42,7 +42,7 @@ class TimedAction:
     Attributes
     ----------
     at_s
-        Begin of the action in seconds after the start of the sequence.
+        Start of the action in seconds after the start of the sequence.
     action
         Action of a device, photograph, or reading of a spectrum.
     """
@@ -57,7 +57,7 @@ def at(at_s: float, action: Action) -> TimedAction:
     Parameters
     ----------
     at_s
-        Begin of the action in seconds after the start of the sequence.
+        Start of the action in seconds after the start of the sequence.
     action
         Action of a device, photograph, or reading of a spectrum.
 

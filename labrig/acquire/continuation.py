@@ -18,7 +18,7 @@ class Pace:
     Attributes
     ----------
     frame_time_s
-        Time from the end of an exposure to the begin of the next one, in seconds.
+        Time from the end of an exposure to the start of the next one, in seconds.
     change_s
         Time by which other settings of the camera prolong it, in seconds.
     reading_s

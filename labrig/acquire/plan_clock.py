@@ -16,7 +16,7 @@ from labrig.record import PERSON
 
 #: Devices of steps that are waits or warnings, and of choices of the protocol.
 WAITING, CHOOSING = "-", "protocol"
-#: Begin of the text of a step by hand.
+#: Start of the text of a step by hand.
 BY_HAND = "by hand: "
 #: Steps that begin so soon are under way, in seconds.
 BEGUN_S = 0.1
@@ -113,7 +113,7 @@ class PlanClock:
             self._move(number + 1, ends_s - (until_s - now_s), now_s)
 
     def at_s(self, now_s: float) -> float:
-        """Return the position in seconds after the begin of the plan."""
+        """Return the position in seconds after the start of the plan."""
         elapsed_s = 0.0 if self._since_s is None else max(now_s - self._since_s, 0.0)
         return min(self._at_s + elapsed_s, self.waits_at_s)
 

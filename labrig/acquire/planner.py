@@ -37,7 +37,7 @@ class Step:
     Attributes
     ----------
     at_s
-        Begin of the step in seconds after the start of the run.
+        Start of the step in seconds after the start of the run.
     unit
         Name of the unit.
     device
@@ -95,7 +95,7 @@ class Plan:
         return self.unit_ends_s[self.units.index(unit)]
 
     def begins_s(self, unit: str) -> float:
-        """Return the begin of a unit in seconds after the start of the run."""
+        """Return the start of a unit in seconds after the start of the run."""
         return (0.0, *self.unit_ends_s)[self.units.index(unit)]
 
     @property

@@ -76,7 +76,7 @@ class Recorder(Protocol):
         """Return the frames with a role, those of completed units before those of this one."""
 
     def frame_times(self, role: str) -> Sequence[tuple[str, float]]:
-        """Return unit and begin of each of these frames, in a plan those that it lays out, too."""
+        """Return unit and start of each of these frames, in a plan those that it lays out, too."""
 
     def spectra(self, role: str) -> Sequence[SpectrumRecord]:
         """Return the spectra with a role, those of completed units before those of this one."""
@@ -98,7 +98,7 @@ class Observer(Protocol):
     """Observer of what goes on in a run; times are on the rig's clock in seconds."""
 
     def doing(self, what: str, until_s: float | None = None) -> None:
-        """Note the begin of an action or, with its end `until_s`, of a wait."""
+        """Note the start of an action or, with its end `until_s`, of a wait."""
 
     def warn(self, text: str) -> None:
         """Show a warning to the person at the bench."""

@@ -48,7 +48,7 @@ class LitPatch:
         Whether even the shortest exposures were clipped, and whether those without the light were,
         shape (m,).
     bleaching
-        Value under the first light at the end of the run over that at its begin; None if it was not
+        Value under the first light at the end of the run over that at its start; None if it was not
         lit again.
     """
 
@@ -131,7 +131,7 @@ def lit_patches(
     role
         Role of the frames with a light on; `-off` is added for those with all lights off.
     begin
-        Begin of the names of the units, which end with the light.
+        Start of the names of the units, which end with the light.
     lights
         Names of the lights.
     first

@@ -24,7 +24,7 @@ _SAME_UNDECLARED = 0.01
 _BULB_S = 1.0
 #: Rounding of times since 1970, in seconds.
 _ROUNDING_S = 1e-4
-#: Scatter of the begin of an exposure, and of the time that a camera notes for it, in seconds.
+#: Scatter of the start of an exposure, and of the time that a camera notes for it, in seconds.
 CLOCK_SCATTER_S = 0.25
 #: Largest drift of a camera's clock against that of the PC: 4 s a day.
 CLOCK_DRIFT = 5e-5
@@ -121,7 +121,7 @@ def clock_warnings(run: RunRecord) -> tuple[ResultWarning, ...]:
 
     The two clocks are compared from one frame to the others, where they stand against each other
     does not matter. An interruption ends the comparison: either clock may be set before a run goes
-    on. A camera may note the begin or the end of an exposure.
+    on. A camera may note the start or the end of an exposure.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def _exposure_difference(
         if abs(measured_s - exposure_s) > _ROUNDING_S:
             return (
                 f"an exposure of {exposure_s:.6g} s in the journal, but {measured_s:.6g} s from "
-                "its begin to its end"
+                "its start to its end"
             )
         possible = exposures(label_s)
         is_same = (

@@ -51,7 +51,7 @@ class ClockedObserver:
         self._observer.unit(name, number, total)
 
     def doing(self, what: str, until_s: float | None = None) -> None:
-        """Note the begin of an action or of a wait."""
+        """Note the start of an action or of a wait."""
         if until_s is None:
             self._plan_clock.begin_step(what, self._clock.now())
         else:

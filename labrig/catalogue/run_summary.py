@@ -39,7 +39,7 @@ class RunSummary:
     made
         Time at which the folder was made, in UTC, by the PC's clock.
     began
-        Begin of the first attempt in UTC, by the clock of the rig; None if there is none.
+        Start of the first attempt in UTC, by the clock of the rig; None if there is none.
     status
         Status of the run.
     done

@@ -16,7 +16,7 @@ from labrig.foundation.quantity import duration_text
 PATIENCE_S, PERIOD_S = 0.5, 0.4
 #: Least time after which the time left is worth stating.
 FORESEEN_S = 2.0
-#: What takes a terminal back to the begin of an empty line.
+#: What takes a terminal back to the start of an empty line.
 EMPTY_LINE = "\r\x1b[2K"
 
 

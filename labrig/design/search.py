@@ -89,7 +89,7 @@ class Problem:
     strongest
         Strongest irradiance of each group, shape (groups,).
     shortest_s, longest_s
-        Shortest step, and time from the begin to the last key, in s.
+        Shortest step, and time from the start to the last key, in s.
     around
         Rates that are taken where no key depends on them, shape (states, groups + 1); None for
         those with which the strongest light fills a good part of the states.

@@ -64,7 +64,7 @@ def solve(
     Parameters
     ----------
     programme
-        Irradiance on the places over time; states are empty before its begin.
+        Irradiance on the places over time; states are empty before its start.
     keys
         Wanted radiances, reflected light included.
     bands

@@ -34,7 +34,7 @@ def write_image_stack(
     path
         Path of the TIFF.
     frames
-        Frames of the glow; the label of each is its begin after lamp off and its exposure time.
+        Frames of the glow; the label of each is its start after lamp off and its exposure time.
     darks
         Dark frames; where none has a frame's exposure time, the black level alone is subtracted.
     width
@@ -94,7 +94,7 @@ def write_image_stack(
                     for frame in frames
                     for channel in names
                 ],
-                "Info": "values in DN/s above black and dark; t is the begin after lamp off",
+                "Info": "values in DN/s above black and dark; t is the start after lamp off",
             },
         )
     return shape

@@ -47,7 +47,7 @@ class NotebookViews:
         Parameters
         ----------
         name
-            Name of the figure, as the page lists it, or its begin; the first one by default.
+            Name of the figure, as the page lists it, or its start; the first one by default.
 
         Raises
         ------

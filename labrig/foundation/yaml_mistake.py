@@ -31,7 +31,7 @@ class MarkedError(Protocol):
 
     @property
     def context_mark(self) -> Mark | None:
-        """Begin of that structure."""
+        """Start of that structure."""
 
     @property
     def problem(self) -> str | None:

@@ -114,7 +114,7 @@ def becquerel_means(
     """Average (1 + u k t)^(−1/u) over each exposure, u = 1/p and k = p/τ; at u = 0 it is e^(−k t).
 
     With z = k T/(1 + u k t), ℓ(x) = log(1 + x)/x and ψ(x) = (e^x − 1)/x the mean is the value at
-    the begin times ℓ(u z) ψ(u z ℓ(u z) − z ℓ(u z)), without a special case.
+    the start times ℓ(u z) ψ(u z ℓ(u z) − z ℓ(u z)), without a special case.
     """
     phase = rate_per_s * t_s
     growth = 1 + shape * phase

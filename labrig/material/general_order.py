@@ -124,7 +124,7 @@ class DarkStep(NamedTuple):
     value
         The quantity.
     by_start, by_k_r, by_order
-        Derivatives by the concentration at the begin, by k, in seconds, and by b.
+        Derivatives by the concentration at the start, by k, in seconds, and by b.
     """
 
     value: FloatArray
@@ -172,7 +172,7 @@ def dark_step(
     ratio, slope = log_ratio(beyond * phase)
     left = np.exp(-phase * ratio)
     after = level * left
-    # −dr/dt is k rᵇ at the end as at the begin, so that rᵇ over its first value is ∂r/∂r(0).
+    # −dr/dt is k rᵇ at the end as at the start, so that rᵇ over its first value is ∂r/∂r(0).
     by_start = left * np.exp(-beyond * phase * ratio)
     log_level = np.log(np.maximum(level, TINY))
     by_beyond = slope * phase * (1 + beyond * log_level) + ratio * log_level
@@ -189,7 +189,7 @@ def mean_emission(
     Parameters
     ----------
     start
-        Concentration at the begin of the exposure, 0 to 1.
+        Concentration at the start of the exposure, 0 to 1.
     k_r_per_s
         Re-radiation rate k > 0 in 1/s.
     order
@@ -283,7 +283,7 @@ def lit_concentration(
     Parameters
     ----------
     start
-        Concentration at the begin, 0 to 1.
+        Concentration at the start, 0 to 1.
     kappa_per_s, k_r_per_s
         Excitation κ > 0 and re-radiation rate k ≥ 0 in 1/s.
     order
@@ -319,7 +319,7 @@ class LitStep(NamedTuple):
     value
         Concentration at the end.
     by_start
-        Derivative by the concentration at the begin.
+        Derivative by the concentration at the start.
     by_kappa, by_k_r, by_order
         Derivatives by κ and k, in seconds, and by b.
     """
@@ -377,7 +377,7 @@ def lit_step(
         by_steady * steady_by[2] + by_order,
     )
     speed = approach.speed(y)
-    # The equation is autonomous: ∂r/∂r(0) is dr/dt at the end over that at the begin.
+    # The equation is autonomous: ∂r/∂r(0) is dr/dt at the end over that at the start.
     by_start = np.exp(-y) * speed / approach.speed(np.zeros_like(y))
     slopes = (
         -np.expm1(-y) * steady_slope - (steady - value) * speed * time_slope
@@ -447,7 +447,7 @@ class _Approach:
 
     @cached_property
     def _part_missing(self) -> FloatArray:
-        """δ at the begin."""
+        """δ at the start."""
         return 1 - self.start / self.steady
 
     def speed(self, y: FloatArray) -> FloatArray:

@@ -257,7 +257,7 @@ def concentration(
     Parameters
     ----------
     start
-        Concentration at the begin, 0 to 1.
+        Concentration at the start, 0 to 1.
     kappa_per_s, k_r_per_s
         Excitation κ ≥ 0 and re-radiation rate k_r ≥ 0 in 1/s.
     duration_s

@@ -69,7 +69,7 @@ def plot(result: NotebookViews, name: str = "") -> "Figure":
     result
         A result, fit, series or material.
     name
-        Name of the figure, or its begin; the first one by default.
+        Name of the figure, or its start; the first one by default.
 
     Returns
     -------

@@ -47,7 +47,7 @@ class FrameRecord:
     start_time, end_time
         Measured begin and end of the exposure in seconds since 1970.
     late_s
-        Delay of the begin of the exposure after its planned time, in seconds.
+        Delay of the start of the exposure after its planned time, in seconds.
     disk_s
         Time that writing the file took, in seconds; nothing else is done during it.
     """
@@ -89,7 +89,7 @@ class SpectrumRecord:
     start_time, end_time
         Measured begin and end of the reading in seconds since 1970.
     late_s
-        Delay of its begin after its planned time, in seconds.
+        Delay of its start after its planned time, in seconds.
     """
 
     path: Path
@@ -209,7 +209,7 @@ class ActionRecord:
     start_time, end_time
         Measured begin and end of the action in seconds since 1970.
     late_s
-        Delay of its begin after its planned time, in seconds.
+        Delay of its start after its planned time, in seconds.
     task
         Command for a changer that replaces the person; empty for the action of a device.
     """

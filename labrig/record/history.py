@@ -188,7 +188,7 @@ class Interruption:
     unit
         Name of the unit.
     began
-        Begin of the attempt, as text.
+        Start of the attempt, as text.
     reason
         Reason for its end.
     """

@@ -223,7 +223,7 @@ class RunFolder:
         name
             Name of the sample.
         started
-            Begin of the run in seconds since 1970.
+            Start of the run in seconds since 1970.
         texts
             Contents of protocol and rig files, as resolved, by file name. The protocol file, by
             which a run folder is recognised, is written last.

@@ -97,7 +97,7 @@ class RunRecord(NotebookViews):
     folder
         Run folder.
     attempts
-        Attempts at units in order of their begin.
+        Attempts at units in order of their start.
     torn
         Whether the last line of the journal is incomplete because of a crash.
     last_time

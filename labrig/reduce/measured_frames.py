@@ -25,7 +25,7 @@ class SeriesFrame:
     path
         Path of the RAW file.
     t_s
-        Begin of the exposure in seconds after lamp off; not used of a dark frame.
+        Start of the exposure in seconds after lamp off; not used of a dark frame.
     exposure_s
         Exposure time in seconds.
     iso, f_number

@@ -184,7 +184,7 @@ class PatchPairs:
         frames
             The patch in the n frames of a unit.
         t_s
-            Begin of each exposure in seconds, shape (n,).
+            Start of each exposure in seconds, shape (n,).
         usable
             Whether the frame can be in a pair, shape (n,).
         darks
@@ -271,7 +271,7 @@ def paired_noise(
     frames
         The patch in n frames.
     t_s
-        Begin of each exposure in seconds, shape (n,).
+        Start of each exposure in seconds, shape (n,).
     unit
         Unit of each frame.
     usable

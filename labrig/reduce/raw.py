@@ -81,7 +81,7 @@ class Exif:
     dng
         Whether the file declares itself a DNG.
     time_s
-        Begin of the exposure by the camera's own clock, in seconds since 1970 in whatever zone the
+        Start of the exposure by the camera's own clock, in seconds since 1970 in whatever zone the
         clock is set to.
     time_step_s
         Step of that clock in seconds.
@@ -178,7 +178,7 @@ def _lens(tags: dict[str, Any]) -> str | None:
 
 
 def _time(tags: dict[str, Any]) -> tuple[float | None, float]:
-    """Return the begin of the exposure by the camera's clock, and the step of that clock, in s."""
+    """Return the start of the exposure by the camera's clock, and the step of that clock, in s."""
     text = _text(tags, "EXIF DateTimeOriginal") or ""
     digits = _text(tags, "EXIF SubSecTimeOriginal") or ""
     try:

@@ -195,7 +195,7 @@ class Swatch:
     Attributes
     ----------
     time
-        Begin of the exposure in seconds after lamp off, as text.
+        Start of the exposure in seconds after lamp off, as text.
     glow
         CSS colour on the scale of all times; black where there is nothing but noise.
     hue

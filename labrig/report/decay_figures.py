@@ -79,7 +79,7 @@ def exposure_middles_s(series: Series) -> FloatArray:
     Parameters
     ----------
     series
-        Signals of n frames with the begin and the length of their exposures.
+        Signals of n frames with the start and the length of their exposures.
 
     Returns
     -------

@@ -101,7 +101,7 @@ def _value_row(quantity: Quantity) -> tuple[str, str, str]:
 
 
 def _first_rows(result: Any) -> Iterator[Table]:
-    """Yield the begin of every CSV table."""
+    """Yield the start of every CSV table."""
     for name, table in result.csv_tables().items():
         rows = [tuple(map(_cell, row)) for row in table.rows]
         more = f"The first of {len(rows)} rows." if len(rows) > FIRST_ROWS else ""

@@ -95,7 +95,7 @@ def _indexed(text: str) -> Markup:
 
 
 def _utc(frame: FrameRecord) -> str:
-    """Return the begin of a frame in UTC as text, to the millisecond."""
+    """Return the start of a frame in UTC as text, to the millisecond."""
     start = datetime.fromtimestamp(frame.start_time, UTC)
     return start.strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
 

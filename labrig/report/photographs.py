@@ -111,7 +111,7 @@ class GlowPicture:
     Attributes
     ----------
     t_s
-        Begin of the exposure in seconds after lamp off.
+        Start of the exposure in seconds after lamp off.
     source
         Picture on the common scale as data URI.
     brightened_source

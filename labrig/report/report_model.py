@@ -43,7 +43,7 @@ class GlowPhotograph:
     frame
         Frame of the decay.
     t_s
-        Begin of the exposure in seconds after lamp off.
+        Start of the exposure in seconds after lamp off.
     """
 
     frame: FrameRecord

@@ -39,13 +39,13 @@ def temperature_figure(
     Parameters
     ----------
     time_s
-        Rising times of the readings in seconds after the begin of the run, shape (n,).
+        Rising times of the readings in seconds after the start of the run, shape (n,).
     celsius
         Readings in °C, shape (n,).
     smooth
         Smoothed readings in °C, shape (n,).
     glow_s
-        Begin and end of each shaded time of the glow in seconds after the begin of the run, shape
+        Begin and end of each shaded time of the glow in seconds after the start of the run, shape
         (m, 2).
     """
     unit_s, unit = (60.0, "min") if time_s[-1] <= MAX_IN_MINUTES_S else (3600.0, "h")

@@ -19,7 +19,7 @@ ON_TIME_S = 1e-4
 
 @dataclass(frozen=True)
 class FrameTiming:
-    """Begin of a frame of a decay.
+    """Start of a frame of a decay.
 
     Attributes
     ----------
@@ -28,9 +28,9 @@ class FrameTiming:
     unit
         Name of the unit.
     t_s
-        Begin of the exposure in seconds after lamp off.
+        Start of the exposure in seconds after lamp off.
     late_s
-        Begin of the exposure less its planned time in s.
+        Start of the exposure less its planned time in s.
     """
 
     frame: str
@@ -65,7 +65,7 @@ class LatenessStatistics:
 def frame_timings(
     frames: Sequence[FrameRecord], patches: Sequence[PatchReport]
 ) -> tuple[FrameTiming, ...]:
-    """Return the begin of each frame of the decay that is in a series, in order of the frames."""
+    """Return the start of each frame of the decay that is in a series, in order of the frames."""
     t_s = {
         name: float(t)
         for patch in patches

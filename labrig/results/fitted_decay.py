@@ -405,7 +405,7 @@ class FittedDecay(NotebookViews):
         Parameters
         ----------
         t_s
-            Begin of each exposure in seconds, as the fitted times count, shape (n,).
+            Start of each exposure in seconds, as the fitted times count, shape (n,).
         exposure_s
             Exposure time in seconds, ≥ 0, one for all or shape (n,).
 
@@ -515,7 +515,7 @@ class FittedDecay(NotebookViews):
         Parameters
         ----------
         t_s
-            Begin of each exposure in seconds after `after_s`, shape (n,).
+            Start of each exposure in seconds after `after_s`, shape (n,).
         exposure_s
             Exposure time in seconds, ≥ 0.
         after_s

@@ -202,7 +202,7 @@ class FittedLaw:
         ----------
         t_s, exposure_s
             Begin after the law's and length of the exposures in seconds, shape (n,); before it, the
-            signal is taken to be that at its begin.
+            signal is taken to be that at its start.
         with_offset
             Whether the offset of the channel is a part of it.
         """
@@ -351,7 +351,7 @@ class DecayForecast:
     Attributes
     ----------
     t_s
-        Begin of the exposures in seconds after lamp off, shape (n,).
+        Start of the exposures in seconds after lamp off, shape (n,).
     value, sigma
         Signal in the brightest channel without offset, and its σ with the differences of the laws
         in it, shape (n,). Beyond three times the last measured time both are NaN.

@@ -260,7 +260,7 @@ class FluorescentPatch(NotebookViews):
     colours
         Colours under some lights.
     bleaching
-        Signal under the first LED at the end of the run over that at its begin.
+        Signal under the first LED at the end of the run over that at its start.
     mixture
         Mixture of normal densities of the measured part of the matrix; None without a dye, or where
         the LEDs excited none.

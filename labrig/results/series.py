@@ -31,7 +31,7 @@ class Series(NotebookViews):
     Parameters
     ----------
     t_s
-        Begin of each exposure in seconds after lamp off, or by another `clock`, shape (n,).
+        Start of each exposure in seconds after lamp off, or by another `clock`, shape (n,).
     exposure_s
         Exposure times in seconds, shape (n,); 0 if unknown.
     values

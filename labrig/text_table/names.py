@@ -202,7 +202,7 @@ _LOGARITHM = re.compile(
     r"(?:\s*[(\[](?:a\.?\s?u\.?|arb.*|1|-)?[)\]])?",
     re.IGNORECASE,
 )
-#: A light divided into that at the begin: its logarithm grows.
+#: A light divided into that at the start: its logarithm grows.
 _INVERSE = re.compile(r"[_\s(]*(?:0|max|t\s*=\s*0)\)?\s*/")
 _MAGNITUDE = re.compile(r"(?P<milli>m?)mag(?:\b.*)?")
 #: The same without a blank: `lnI`, but not `Login`.

@@ -365,7 +365,7 @@ def backward_rows(t_s: FloatArray) -> npt.NDArray[np.intp]:
 
 
 def starts_again(t_s: FloatArray, row: int) -> bool:
-    """Return whether the time of a row is that of the begin, as in a repeated decay."""
+    """Return whether the time of a row is that of the start, as in a repeated decay."""
     return bool(t_s[row] <= t_s[0] + np.median(np.abs(np.diff(t_s))))
 
 

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-#: Begin of a cell: that of the text, or after a separator, with blanks and quotation marks.
+#: Start of a cell: that of the text, or after a separator, with blanks and quotation marks.
 _BEGIN = r'(?P<begin>(?:^|[,;|\t\r\n])[ \u00a0"]*)'
 #: Characters that make a formula of a cell, also in their wide forms.
 _FORMULA = r"(?P<quotes>'*)(?=[=+\-@\t\r\uff1d\uff0b\uff0d\uff20])"

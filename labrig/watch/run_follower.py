@@ -62,7 +62,7 @@ class Course:
         -------
         dict
             `done`: last steps, each with its `time` in seconds since 1970. `next`: next steps, each
-            with its planned time `at_s` in seconds after the begin of the unit. `time` and `at_s`:
+            with its planned time `at_s` in seconds after the start of the unit. `time` and `at_s`:
             time and planned time of the last step; `until_s`: planned time at which the next line
             of the journal is due. `ends_s`: planned end of the run. `by_hand`: next step by hand in
             this unit or a later one, with its planned time; None if there is none.
@@ -237,7 +237,7 @@ class RunFollower:
         return {"unit": self._plan.units.index(attempt.unit), **course.status_of(attempt)}
 
     def _course_of(self, attempt: Attempt) -> Course:
-        """Return the plan of what is left since the begin of an attempt."""
+        """Return the plan of what is left since the start of an attempt."""
         if self._course is None or self._course.uid != attempt.uid:
             attempts = self._record.attempts
             before = attempts[: attempts.index(attempt)]

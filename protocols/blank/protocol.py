@@ -44,7 +44,7 @@ from labrig.record import FrameRole
 WHY = "the frames of the sequence without a glow are measured"
 #: Role of the frames of the sequence.
 BLANK_FRAMES = "blank"
-#: Begin of the first frame of a sequence without a door.
+#: Start of the first frame of a sequence without a door.
 EARLIEST_S = 0.1
 
 
@@ -138,7 +138,7 @@ class Blank(ConfiguredProtocol):
         return exposure_lines(self.exposure, self.exposures_s(capabilities)[0])
 
     def times_s(self, earliest_s: float, later_s: float) -> list[float]:
-        """Return the begin of each frame of a sequence in seconds after lamp off."""
+        """Return the start of each frame of a sequence in seconds after lamp off."""
         first_s = (earliest_s if self.first == "auto" else self.first) + later_s
         return frame_times_s(first_s, self.every, self.duration)
 

@@ -89,7 +89,7 @@ def _figure(result: BlankResult) -> Figure:
     if file.first_clean_s is not None:
         axes.axvline(file.first_clean_s, color=MUTED, linewidth=1.0, linestyle=DASHED)
         entries.append(line_entry("end of the transient", MUTED, DASHED))
-    axes.set_xlabel("Begin of the exposure after lamp off / s")
+    axes.set_xlabel("Start of the exposure after lamp off / s")
     axes.set_ylabel("Signal above background / (DN/s)")
     legend_above(figure, entries, columns=4)
     return figure

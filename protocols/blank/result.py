@@ -29,7 +29,7 @@ class StrayLight:
     unclean
         Whether stray light above the constant level is detected, shape (n,).
     first_clean_s
-        Begin of the first frame from which all are clean, in seconds after lamp off; None if there
+        Start of the first frame from which all are clean, in seconds after lamp off; None if there
         is none.
     """
 

@@ -28,7 +28,7 @@ from labrig.protocols.steps.grey_card import light_card
 from labrig.protocols.steps.patch_names import FilterPatches
 from labrig.protocols.steps.sample_pose import charge, check_visible, lights_out
 
-#: Begin of the units' names, which end with the lamp.
+#: Start of the units' names, which end with the lamp.
 _AFTER = "spectrum-"
 
 
@@ -109,7 +109,7 @@ class EmissionSpectrum(GlowSettings, ConfiguredProtocol):
     camera
         Sensitivity and aperture of the camera.
     times
-        Begin of each photograph after lamp off, rising, for example `[2 s, 10 s]`. The spectrum is
+        Start of each photograph after lamp off, rising, for example `[2 s, 10 s]`. The spectrum is
         to be the same at all of them (Nalbach et al., fig. 6), which is tested.
     lamps
         Lamps to charge with, one after the other: `halogen`, `mercury` or both. Whether the
@@ -156,7 +156,7 @@ class EmissionSpectrum(GlowSettings, ConfiguredProtocol):
         return SpectrumFrames.GLOW
 
     def times_s(self) -> Sequence[float]:
-        """Return the begin of each frame in seconds after lamp off."""
+        """Return the start of each frame in seconds after lamp off."""
         return self.times
 
     def regions(self) -> Sequence[Region]:

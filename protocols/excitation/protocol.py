@@ -240,7 +240,7 @@ class ExcitationSettings(MeteredSettings):
         return self.first_charge * 2.0 ** (number - 1)
 
     def frame_times_s(self, lasting_s: float) -> list[float]:
-        """Return the planned begin of each frame in seconds after lamp off."""
+        """Return the planned start of each frame in seconds after lamp off."""
         times_s, pause_s = [self.first], self.every
         while times_s[-1] + pause_s <= lasting_s:
             times_s.append(times_s[-1] + pause_s)

@@ -70,7 +70,7 @@ class Isotropy(GlowSettings):
         return "isotropy"
 
     def times_s(self) -> Sequence[float]:
-        """Return the begin of each frame in seconds after lamp off."""
+        """Return the start of each frame in seconds after lamp off."""
         return [self.first + number * self.every for number in range(self.frames)]
 
     def regions(self) -> Sequence[Region]:

@@ -63,7 +63,7 @@ class LedBrightnessResult(RunResult):
     leds
         Measurement of each LED by its name.
     drift
-        Relative change of the first LED from the begin to the end of the run; null if it was not
+        Relative change of the first LED from the start to the end of the run; null if it was not
         lit twice.
 
     Examples

@@ -37,7 +37,7 @@ class LedFrames(StrEnum):
     SAMPLE_OFF = "led-sample-off"
 
 
-#: Begin of the names of the samples' units.
+#: Start of the names of the samples' units.
 SAMPLE = "sample "
 
 

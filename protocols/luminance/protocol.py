@@ -394,7 +394,7 @@ class Luminance(ProtocolModel):
         return capabilities.exposure_at_most(min(self.longest, SHORT * at_s))
 
     def next_s(self, begin_s: float, capabilities: CameraCapabilities) -> float:
-        """Return the begin of the frame after one, however long that exposes."""
+        """Return the start of the frame after one, however long that exposes."""
         spent_s = (
             self.longest_exposure_s(begin_s, capabilities) + capabilities.overhead_s + MARGIN_S
         )

@@ -431,7 +431,7 @@ def _levels(
 
 
 def growth(before: Curve, last: Curve, fit: FittedDecay, *, at_end: bool) -> Measured:
-    """Return the relative growth of the glow between two decays, at their begin or end.
+    """Return the relative growth of the glow between two decays, at their start or end.
 
     The frames of two decays are at other times. Each decay is held against a fit, and a parabola in
     time common to both takes up by what the fit is wrong there, the noise it followed included.

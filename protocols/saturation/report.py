@@ -137,7 +137,7 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
             Picture(
                 f"charges-{name}",
                 partial(_decays_figure, patch),
-                "Decays after different charges over their begin, and their residuals with shared "
+                "Decays after different charges over their start, and their residuals with shared "
                 "rates, in σ.",
             ),
             *order,

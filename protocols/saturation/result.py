@@ -196,7 +196,7 @@ class PatchSaturation:
     rates
         Test of shared rates.
     growth_at_begin, growth_at_end
-        Relative growth of the glow between the last two charges under the full light, at the begin
+        Relative growth of the glow between the last two charges under the full light, at the start
         and at the end of their decays, where slow states dominate.
     levels
         Level of every state by falling rate; empty without a weaker light.

@@ -29,7 +29,7 @@ FADED_IN_DOUBT = 0.05
 LOOK_AGAIN_S = 60.0
 #: Largest noise of two levels that can be compared.
 MAX_NOISE = 0.01
-#: Number of shutter times at the begin of the ladder that are too short for a glow to clip.
+#: Number of shutter times at the start of the ladder that are too short for a glow to clip.
 SHORT = 3
 #: A glow that stays level in the second half of a decay at more than this fraction of its first
 #: frame may be another light.
@@ -97,7 +97,7 @@ class Glow:
     Attributes
     ----------
     at_s
-        Middle of the exposure in seconds after the planned begin of the first frame.
+        Middle of the exposure in seconds after the planned start of the first frame.
     exposure_s
         Shutter time in seconds.
     rate, sigma
@@ -170,7 +170,7 @@ def classify_decay(
     Parameters
     ----------
     first, middle, last
-        Frames of the begin, the middle and the end of the decay.
+        Frames of the start, the middle and the end of the decay.
     before
         Frames of the metering or of an earlier decay, with which the first frame is compared.
     """

@@ -21,7 +21,7 @@ from labrig.foundation.quantity import DurationS, duration_text
 
 
 def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]:
-    """Return the begin of each frame, evenly from `first_s` to `until_s`, included if it fits.
+    """Return the start of each frame, evenly from `first_s` to `until_s`, included if it fits.
 
     Raises
     ------
@@ -163,7 +163,7 @@ NOTABLE = 0.005
 #: Sensitivities and apertures beyond those of any camera and lens are slips of the pen.
 Iso = Annotated[int, Field(ge=1, le=10_000_000), NearestOfCamera("isos", "ISO ")]
 FNumber = Annotated[float, Field(ge=0.1, le=1000), NearestOfCamera("f_numbers", "f/")]
-#: Time from the begin of a frame to that of the next one.
+#: Time from the start of a frame to that of the next one.
 FramePeriod = Annotated[DurationS, Field(gt=0), LongEnoughForCamera()]
 
 

@@ -180,7 +180,7 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
         return self.model_copy(update={"first": first_s})
 
     def frame_times_s(self) -> list[float]:
-        """Return the even begin of each frame in seconds after lamp off."""
+        """Return the even start of each frame in seconds after lamp off."""
         return frame_times_s(self.first_s, self.every, self.duration)
 
     def longest_exposure_s(self, capabilities: CameraCapabilities) -> float:
@@ -269,7 +269,7 @@ class DecaySettings(MeteredChargeSettings, ConfiguredProtocol):
         capabilities
             Exposure settings that the camera offers.
         expected
-            Function that predicts a frame of the glow in each patch, from its begin after lamp off
+            Function that predicts a frame of the glow in each patch, from its start after lamp off
             and its shutter time in seconds.
         warn
             Function that receives warnings.

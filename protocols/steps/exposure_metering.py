@@ -34,7 +34,7 @@ def glow(path: Path, region: Region) -> float:
 
 @dataclass(frozen=True)
 class Schedule:
-    """Begin of each frame of a decay in seconds after lamp off, and its shutter time in seconds."""
+    """Start of each frame of a decay in seconds after lamp off, and its shutter time in seconds."""
 
     times_s: tuple[float, ...]
     exposures_s: tuple[float, ...]
@@ -125,7 +125,7 @@ class DecayMeter:
         Parameters
         ----------
         times_s
-            Begin of each frame in seconds after lamp off.
+            Start of each frame in seconds after lamp off.
         capabilities
             Exposure settings that the camera offers.
         longest_s

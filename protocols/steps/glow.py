@@ -85,7 +85,7 @@ def ladder(
     Parameters
     ----------
     first_s
-        Begin of the first frame after lamp off in seconds.
+        Start of the first frame after lamp off in seconds.
     longest_s
         Longest shutter time in seconds.
     capabilities
@@ -146,7 +146,7 @@ class GlowSettings(MeteredChargeSettings):
 
     @abstractmethod
     def times_s(self) -> Sequence[float]:
-        """Return the begin of each frame in seconds after lamp off, rising."""
+        """Return the start of each frame in seconds after lamp off, rising."""
 
     @abstractmethod
     def regions(self) -> Sequence[Region]:

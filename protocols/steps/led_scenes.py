@@ -33,7 +33,7 @@ LED_NAMES = (
 )  # fmt: skip
 #: The bench with the samples, and with the card in their place.
 ON_SAMPLE, ON_CARD = BenchConfiguration(), BenchConfiguration("grey card")
-#: Begin of the names of units, which end with the LED: the card, and the first LED once more.
+#: Start of the names of units, which end with the LED: the card, and the first LED once more.
 CARD, AGAIN = "card ", "again "
 CARD_REASON = "its light under every LED measures the brightness of the LED"
 

@@ -63,7 +63,7 @@ def charge(session: Session, duration_s: float, on: LampSwitch | LedSwitch = LAM
 
 
 def lights_out(session: Session, off: LampSwitch | LedSwitch = LAMP_OFF) -> Sequence[TimedAction]:
-    """Return the begin of a timed sequence: lamp off, shield before it, then the door opens."""
+    """Return the start of a timed sequence: lamp off, shield before it, then the door opens."""
     steps = [at(0.0, off)]
     if SHIELD in session.rig:
         steps.append(at(0.0, SHIELD_COVER))

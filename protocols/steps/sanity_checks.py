@@ -171,7 +171,7 @@ class SanityChecks:
         Parameters
         ----------
         times_s
-            Planned begin of each frame in seconds after lamp off.
+            Planned start of each frame in seconds after lamp off.
         """
         frames = self._unit_frames(self.role)
         if not frames:
@@ -222,7 +222,7 @@ class SanityChecks:
         return [frame for frame in self.session.frames(role) if frame.unit == self.unit]
 
     def _reference_glows(self) -> list[Glow]:
-        """Return the glow of the metering, else that at the begin of the first complete decay."""
+        """Return the glow of the metering, else that at the start of the first complete decay."""
         decays = self.session.frames(self.role)
         metering = [
             frame for frame in self.session.frames(FrameRole.METER) if frame.unit == self.metering
@@ -232,7 +232,7 @@ class SanityChecks:
         return self._glows(metering or decays[:2])
 
     def _glows(self, frames: Sequence[FrameRecord]) -> list[Glow]:
-        """Return the glow of frames, at times from the planned begin of the first of them."""
+        """Return the glow of frames, at times from the planned start of the first of them."""
         zero_s = frames[0].start_time - frames[0].late_s
         darks = [
             self._measure(frame)

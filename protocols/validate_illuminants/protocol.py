@@ -37,7 +37,7 @@ class IlluminantFrames(StrEnum):
 
 #: Lamps of the shipped rig.
 LAMP_NAMES = ("daylight", "halogen", "xenon", "ultraviolet")
-#: Begin of the names of the units of samples and chart, which end with the lamp.
+#: Start of the names of the units of samples and chart, which end with the lamp.
 SAMPLE, CHART = "sample ", "chart "
 ON_CHART = BenchConfiguration("colorchecker")
 

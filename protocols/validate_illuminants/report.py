@@ -66,7 +66,7 @@ def _line(comparison: LampComparison) -> str:
     without = [patch.delta_e_reflected.value for patch in comparison.patches.values()]
     return (
         f"{comparison.verdict} (χ² per channel {comparison.reduced_chi2:.2f}, largest pull "
-        f"{comparison.largest_pull:+.1f} σ); ΔE2000 up to {max(differences):.1f}, without "
+        f"{comparison.largest_pull:+z.1f} σ); ΔE2000 up to {max(differences):.1f}, without "
         f"fluorescence up to {max(without):.1f}"
     )
 
@@ -78,7 +78,7 @@ def _overview(result: ValidateIlluminantsResult) -> Section:
             rounded(comparison.brightness, 3),
             comparison.scale,
             f"{comparison.reduced_chi2:.2f}",
-            f"{comparison.largest_pull:+.1f}",
+            f"{comparison.largest_pull:+z.1f}",
             _of_patches([patch.delta_e.value for patch in comparison.patches.values()]),
             _of_patches([patch.delta_e_reflected.value for patch in comparison.patches.values()]),
             comparison.verdict,
@@ -175,7 +175,7 @@ def _values(comparison: LampComparison, channels: tuple[str, ...]) -> Table:
                 plus_minus(v / unit, s / unit)
                 for v, s in zip(patch.predicted, patch.predicted_sigma, strict=True)
             ),
-            *(f"{pull:+.1f}" for pull in patch.pull),
+            *(f"{pull:+z.1f}" for pull in patch.pull),
         )
         for name, patch in comparison.patches.items()
     )

@@ -42,7 +42,7 @@ class ObjectStore:
     clock
         The room's clock.
     folder, prefix
-        Folder in DCIM of the camera's photographs, and begin of their names.
+        Folder in DCIM of the camera's photographs, and start of their names.
     cards
         Storage ids; a second card has no folders.
     """

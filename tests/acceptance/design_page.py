@@ -25,7 +25,7 @@ from tests.chromium import browser
 STEPS = 60
 #: Times in s after the light, colours and brightnesses of the keys.
 KEYS = ((1, "#20c060", 4e-3), (5, "#20b060", 2e-3), (20, "#20a060", 1e-3), (60, "#209060", 3e-4))
-#: Begin of the darkness of a page about patches.
+#: Start of the darkness of a page about patches.
 DARK_S = 300.0
 #: A dot on the left wall of the shipped box.
 DOT = (0.1, 0.55)

@@ -4,7 +4,7 @@
 
 The simulated camera, in a process of its own, opens its shutter 63 ms after the full press has
 arrived and says when that was, on the clock that all processes share. For each way to release:
-milliseconds from `shoot` to the full press, and the driver's begin of the exposure less the true
+milliseconds from `shoot` to the full press, and the driver's start of the exposure less the true
 one.
 """
 
@@ -49,7 +49,7 @@ class Tell:
 
 
 def serve(autofocus: bool) -> None:
-    """The camera; its address first, then the begin of each exposure."""
+    """The camera; its address first, then the start of each exposure."""
     clock, room_clock = SystemClock(), VirtualClock()
     pace = Pace(clock, room_clock)
     tell = Tell(clock.now() - pace.catch_up())

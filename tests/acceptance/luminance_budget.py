@@ -25,7 +25,7 @@ from tests.analyse.camera_filters_bench import PLACE, recorded as through_filter
 from tests.analyse.luminance_bench import QUICK, luminance_after, record, write_glow, write_rig
 from tests.analyse.recorded import part_of
 
-#: Names of the factors by the begin of those of a result.
+#: Names of the factors by the start of those of a result.
 FACTORS = {
     "luxmeter": "reading",
     "colour": "colour",

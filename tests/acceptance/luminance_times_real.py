@@ -7,7 +7,7 @@ the luminescence of two quartzes under constant light (CRAN package Luminescence
 semiconductors after a laser's pulse at five powers (Grossmann), of which the rates of the third and
 the fourth grow with time, as no sum of exponentials does. The level is the first reading over 10,
 30 and 100, as far as fifty counts are left of it; the true time is measured by the whole decay. Up
-to eighty single readings, evenly spaced in ln t (16 or more), are taken from the begin to a part of
+to eighty single readings, evenly spaced in ln t (16 or more), are taken from the start to a part of
 that time, from four phases, with σ of their counts and without; time and light are scaled to hours
 and 0.3 mcd/m².
 
@@ -40,7 +40,7 @@ SAO_COUNT, SAO_DARK_S, SAO_OFF_S = 1.448, 29.0, 330.0
 
 
 class Decay(NamedTuple):
-    """A real decay in counts over the time from its begin."""
+    """A real decay in counts over the time from its start."""
 
     name: str
     t_s: FloatArray

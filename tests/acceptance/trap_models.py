@@ -59,7 +59,7 @@ LAMP_SIGMA = 0.01
 FULL_CHARGE_S = 900.0
 CHARGES_S = (5.0, 30.0, 120.0)
 DECAYS_S = (5.0, 30.0, 90.0, 180.0)
-#: Begin of a photograph after lamp off, and its length, in seconds.
+#: Start of a photograph after lamp off, and its length, in seconds.
 FIRST_S, EXPOSURE_S = 1.0, 0.5
 PERCENT, SIGMAS = 2.0, 3.0
 STEP = 1e-4

@@ -54,7 +54,7 @@ from tests.acceptance.wrong_rooms import BESIDE, CLEAN, DECAYS, Case
 
 #: Deviation in σ from which a result is wrong.
 WRONG_SIGMAS = 3.0
-#: Begin of the exposures of a second, after lamp off, in which signals are compared; the last one
+#: Start of the exposures of a second, after lamp off, in which signals are compared; the last one
 #: ends three times as late as the last frame.
 SIGNALS_S = (0.5, 5.0, 20.0, 60.0, 150.0, 520.0)
 EXPOSURE_S = 1.0

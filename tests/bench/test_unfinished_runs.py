@@ -34,7 +34,7 @@ def run(labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path) -> 
 
 
 def shorten(run: Path, unit: str, torn: bytes = b"") -> list[str]:
-    """Cut the journal at the begin of a unit; return the names of frames that lost their lines."""
+    """Cut the journal at the start of a unit; return the names of frames that lost their lines."""
     lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
     start = next(n for n, line in enumerate(lines) if f'"unit": "{unit}"'.encode() in line)
     kept = b"".join(lines[: start + 1])

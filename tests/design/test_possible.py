@@ -12,7 +12,7 @@ GREEN = np.array([0.001, 0.01, 0.002])
 
 
 def designed(time_s: list[float], factors: list[float], light: LightProgramme = CHARGE) -> Design:
-    """A design of keys in one green at times after the begin."""
+    """A design of keys in one green at times after the start."""
     keys = Keys.checked(0, time_s, np.multiply.outer(factors, GREEN))
     return solve(light, keys, RGB, albedo=0.2)
 

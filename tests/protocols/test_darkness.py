@@ -13,7 +13,7 @@ from labrig.protocols.steps.darkness import DARK, Darkness, darkness
 from tests.protocols.metering import RANGE_DN, measure_frame
 
 EXPOSURES_S = (0.05, 0.8, 3.2)
-#: From the end of one exposure to the begin of the next.
+#: From the end of one exposure to the start of the next.
 PAUSE_S = 1.2
 
 

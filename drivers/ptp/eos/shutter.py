@@ -59,7 +59,7 @@ class EosShutter:
             self._release.press_half()
 
     def expose(self, exposure_s: float) -> tuple[float, float]:
-        """Expose with the camera's settings; return the clock times of the begin and the end.
+        """Expose with the camera's settings; return the clock times of the start and the end.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class EosShutter:
         return start_s, end_s
 
     def expose_at_bulb(self, exposure_s: float) -> tuple[float, float]:
-        """Expose for a time on the clock; return the clock times of the begin and the end.
+        """Expose for a time on the clock; return the clock times of the start and the end.
 
         Raises
         ------

@@ -205,7 +205,7 @@ def fit_charge_and_decay(
     Parameters
     ----------
     t_s
-        Begin of each reading in seconds on any clock, shape (n,).
+        Start of each reading in seconds on any clock, shape (n,).
     values
         Light, shape (n,), in any unit.
     sigma

@@ -86,7 +86,7 @@ def fit_decay(
     Parameters
     ----------
     t_s
-        Begin of each exposure in seconds, shape (n,), in any order. 0 is lamp off, where the
+        Start of each exposure in seconds, shape (n,), in any order. 0 is lamp off, where the
         amplitudes are told, unless the fastest state lives less than a fifth of the time from
         there to the first frame: then the clock tells nothing of lamp off, amplitudes are those at
         the first frame, and laws with a shape begin there. So they do where all times are negative.

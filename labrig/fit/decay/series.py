@@ -94,7 +94,7 @@ class DecaySeries:
 
     @property
     def t_s(self) -> FloatArray:
-        """Begin of the exposures in s, as given, shape (n,)."""
+        """Start of the exposures in s, as given, shape (n,)."""
         return np.asarray(self.first_s + self.t * self.span_s)
 
     @cached_property

@@ -97,7 +97,7 @@ def closure(
         Concentrations before each charge: a scalar, (m,) or (n, m), or (P, n, m) of P sites whose
         levels are averaged.
     dark_s, exposure_s
-        Time from lamp off to the begin of the exposure, and its length, in s: a scalar or (n,).
+        Time from lamp off to the start of the exposure, and its length, in s: a scalar or (n,).
     kinetic_order
         Kinetic order b of each state: a scalar or (m,).
 

@@ -371,6 +371,6 @@ def bands_of(series: Sequence[ChargingSeries]) -> int:
 
 
 def _begins(counts: Sequence[int]) -> list[int]:
-    """Return the begin of each of several blocks, and the end of the last one."""
+    """Return the start of each of several blocks, and the end of the last one."""
     ends: list[int] = np.cumsum([0, *counts]).tolist()
     return ends

@@ -106,7 +106,7 @@ def albedo_factor(scene: Scene, states: list[PhosphorState], n_places: int) -> F
     return None if (factor == 1).all() else factor
 
 
-#: Is called for each step with its begin in s and the mean irradiance during it.
+#: Is called for each step with its start in s and the mean irradiance during it.
 Record = Callable[[float, FloatArray], None]
 
 #: First step after a change of light, as a part of the fastest relaxation; later ones grow.
@@ -338,7 +338,7 @@ class Renderer:
         t_s
             Time in s, not before the time that has been reached.
         record
-            What is called for each step of a scene where nothing moves, with its begin in s and the
+            What is called for each step of a scene where nothing moves, with its start in s and the
             mean irradiance during it, shape (places, bands).
         """
         if not self._states or t_s <= self._t_s:

@@ -152,7 +152,7 @@ def _without_summer_time(clock: Clock) -> Clock:
             warnings.append(
                 Disturbance(
                     "summer-time",
-                    "the clock goes ahead from {before} to {after}, by an hour as at the begin of "
+                    "the clock goes ahead from {before} to {after}, by an hour as at the start of "
                     "summer time: the spacing of the rows shows it, and an hour was taken off from "
                     "there on",
                     line,

@@ -34,7 +34,7 @@ class CardFrame:
     unit, role
         Unit and role in the run.
     time_s
-        Begin of the frame in seconds, on any clock.
+        Start of the frame in seconds, on any clock.
     exposure_s, iso, f_number
         Nominal exposure time in seconds, ISO and f-number.
     light, sigma

@@ -501,7 +501,7 @@ def _drift_warnings(what: str, light: str, drift: Measured) -> Iterator[ResultWa
         yield Disturbance(
             "sample-bleached",
             "under {light}, read once more at the end, it gave {ratio.plus_minus} of its light at "
-            "the begin: the light changed or the sample bleaches; the change is in σ",
+            "the start: the light changed or the sample bleaches; the change is in σ",
             subject=what,
             light=light,
             ratio=drift,

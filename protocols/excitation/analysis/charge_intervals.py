@@ -70,7 +70,7 @@ class ChargeFrames:
 
     @property
     def zero_s(self) -> float:
-        """Begin of the first charge in seconds since 1970, from which times count."""
+        """Start of the first charge in seconds since 1970, from which times count."""
         return self.intervals[0].on_s
 
     def after(self, interval: ChargeInterval) -> list[FrameRecord]:

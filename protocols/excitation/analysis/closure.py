@@ -145,7 +145,7 @@ def _equivalent_charge_s(
 
 
 def _initial_concentrations(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
-    """Return what the charge before has left at every site at the begin of each, (P, K, N)."""
+    """Return what the charge before has left at every site at the start of each, (P, K, N)."""
     k_r = np.array([state.k_r_per_s for state in fit.states])
     order = np.array([state.kinetic_order for state in fit.states])
     charges = direct.charges

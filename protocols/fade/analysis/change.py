@@ -172,7 +172,7 @@ class Smooth:
     degree
         Degree of the polynomial.
     last_s
-        Begin of the last photograph in seconds after the switch; beyond it u is linear.
+        Start of the last photograph in seconds after the switch; beyond it u is linear.
     """
 
     rises: bool

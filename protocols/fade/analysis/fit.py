@@ -1,6 +1,6 @@
 """Fit of the lamp's transients to photographs.
 
-The begin of a photograph after the switch is known up to a constant lag and some jitter, which all
+The start of a photograph after the switch is known up to a constant lag and some jitter, which all
 its places and colours share, as they share its flicker. The camera's curves and its dark level have
 errors that all photographs share, and so has the steady light to which those of a pass are
 relative: without these in the noise, every colour's fade would be a little off that of a glowing
@@ -272,11 +272,11 @@ class _Problem:
         return np.array([*first, 1.0, self._prior.expected[LAG]])
 
     def model(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ∫ fraction dt of every photograph, and its slope by the begin; (n, S) each."""
+        """Return ∫ fraction dt of every photograph, and its slope by the start; (n, S) each."""
         return self._integrals(theta, self._weights)
 
     def _integrals(self, theta: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return ∫ fraction dt, and its slope by the begin, in k weightings (k, wavelengths)."""
+        """Return ∫ fraction dt, and its slope by the start, in k weightings (k, wavelengths)."""
         fraction = fraction_of(self._shape, theta, self._nm, self._grid_s) @ weights.T
         steps = STEP_S * (fraction[1:] + fraction[:-1]) / 2
         integral = np.vstack([np.zeros(fraction.shape[1]), np.cumsum(steps, axis=0)])

@@ -181,7 +181,7 @@ def _with_spectrum(led: LedLightMeasured, seen: Spectrometry) -> LedLightMeasure
 def _drift(
     first: str, values: Mapping[str, CameraValues], spectra: Mapping[str, Spectrometry]
 ) -> Measured | None:
-    """Return the relative change of the first LED from the begin to the end of the run."""
+    """Return the relative change of the first LED from the start to the end of the run."""
     begin, end = f"{CARD}{first}", f"{AGAIN}{first}"
     bands = [spectra[unit].band for unit in (begin, end) if unit in spectra]
     if len(bands) == 2 and bands[0] is not None and bands[1] is not None:
@@ -381,7 +381,7 @@ class _Calibration:
         if self.drift is not None and abs(self.drift.value) > max(DRIFT, 3 * self.drift.sigma):
             yield Disturbance(
                 "lamp-drifts",
-                "LED '{leds}' changed by {drift:+.1%} from the begin to the end of the run; σ has "
+                "LED '{leds}' changed by {drift:+.1%} from the start to the end of the run; σ has "
                 "it, but let the bench warm up, or look for something that was moved",
                 leds=(self.part.protocol.shuffled()[0],),
                 drift=self.drift.value,

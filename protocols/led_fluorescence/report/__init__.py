@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from labrig.foundation.number_format import plus_minus
+from labrig.foundation.number_format import plus_minus, rounded
 from labrig.material import ReradiationMatrix, appearance
 from labrig.optics import Spectrum, read_light
 from labrig.protocols.led_fluorescence.report.led_figures import (
@@ -162,23 +162,30 @@ def _strongest_share(patch: FluorescentPatch) -> tuple[str, str]:
 
 
 def _summary(result: LedFluorescenceResult) -> Section:
-    """Return the table of all samples."""
-    rows = []
+    """Return the colours and the table of all samples."""
+    rows, swatches = [], []
     for name, patch in result.patches.items():
         colour, share, nm = patch.colours[0], "–", "–"
         if patch.dyes:
             share, nm = _strongest_share(patch)
         mark = " *" if colour.depends_on_uv else ""
-        chi2 = f"{patch.reduced_chi2:.1f}" if np.isfinite(patch.reduced_chi2) else "–"
-        rows.append((f"{name}{mark}", str(len(patch.dyes)), share, nm, *_lab(colour), chi2))
+        chi2 = rounded(patch.reduced_chi2, 2)
+        rows.append((f"{name}{mark}", nm, *_lab(colour), chi2))
+        swatch = _swatch(patch.matrix.named(name), read_light(colour.light))
+        swatches.append((f"{name}{mark}", swatch, str(len(patch.dyes)), share))
     light = next(iter(result.patches.values())).colours[0].light
     table = Table(
-        ("sample", "dyes", "re-radiated / %", "of / nm", "L*", "a*", "b*", "reduced χ²"),
+        ("sample", "re-radiated most of / nm", "L*", "a*", "b*", "reduced χ²"),
         tuple(rows),
-        f"Re-radiated: the largest part of any incident wavelength that an LED had. Colours under "
-        f"{light}, with a perfect white under it, CIE 1931 2° observer; ± 1 σ.",
+        f"L*, a*, b* under {light}, with a perfect white under it, CIE 1931 2° observer; ± 1 σ.",
     )
-    return Section("All samples", (UV_SCALE[result.uv_scale],), tables=(table,))
+    return Section(
+        "All samples",
+        (UV_SCALE[result.uv_scale],),
+        tables=(table,),
+        template=own_template(__file__, "samples"),
+        content=(light, tuple(swatches)),
+    )
 
 
 def _strongest(matrix: ReradiationMatrix, patch: FluorescentPatch) -> int:
@@ -354,7 +361,7 @@ def _text(patch: FluorescentPatch) -> Iterator[str]:
         )
     if patch.bleaching is not None:
         ratio = plus_minus(patch.bleaching.value, patch.bleaching.sigma)
-        yield f"At the end of the run the first LED gave {ratio} of its light at the begin."
+        yield f"At the end of the run the first LED gave {ratio} of its light at the start."
 
 
 def _dye_tables(patch: FluorescentPatch, matrix: ReradiationMatrix) -> tuple[Table, ...]:

@@ -59,7 +59,7 @@ class Packet:
             raise MalformedPacketError from None
 
     def split(self, layout: str) -> tuple[tuple[int, ...], bytes]:
-        """Return the numbers at the begin of the payload, and the rest of it."""
+        """Return the numbers at the start of the payload, and the rest of it."""
         size = struct.calcsize("<" + layout)
         return Packet(self.kind, self.payload[:size]).fields(layout), self.payload[size:]
 
@@ -80,7 +80,7 @@ class PacketReader:
         Raises
         ------
         MalformedPacketError
-            The length is impossible; the begin of the next packet is unknown.
+            The length is impossible; the start of the next packet is unknown.
         """
         if len(self._received) < _HEADER.size:
             return None

@@ -35,7 +35,7 @@ class LampDrift(ProtocolModel):
     frames
         Number of photographs.
     every
-        Time from the end of one photograph to the begin of the next, for example `10 s`.
+        Time from the end of one photograph to the start of the next, for example `10 s`.
     exposure
         Longest exposure time; the camera's nearest one below is used.
     region

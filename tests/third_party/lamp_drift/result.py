@@ -18,7 +18,7 @@ class LampDriftResult(RunResult):
     drift
         Change of the light relative to its mean, per second.
     time_s
-        Begin of each photograph after that of the first one, in seconds, shape (n,).
+        Start of each photograph after that of the first one, in seconds, shape (n,).
     level_dn_per_s
         Mean of the green channel over the exposure time, shape (n,).
     change_sigmas

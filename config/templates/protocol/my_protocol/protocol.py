@@ -75,7 +75,7 @@ class GlowUnit:
         settings = ExposureSettings(capabilities.exposure_at_most(protocol.exposure), 400, 4.0)
         session.perform(LAMP_ON)
         session.wait(protocol.charge, "charging")
-        # A sequence keeps to the times since its begin, whatever each photograph takes.
+        # A sequence keeps to the times since its start, whatever each photograph takes.
         shots = [
             at(1.0 + number * protocol.every, TakeFrame(MyProtocolFrames.GLOW, settings))
             for number in range(protocol.frames)

@@ -16,7 +16,7 @@ class MyProtocolResult(RunResult):
     left
         Level in the last photograph over that in the first one.
     time_s
-        Begin of each photograph after that of the first one, in seconds, shape (n,).
+        Start of each photograph after that of the first one, in seconds, shape (n,).
     level_dn_per_s, sigma_dn_per_s
         Mean of the green channel over the exposure time and its standard uncertainty, shape (n,).
     """
