@@ -5,11 +5,13 @@ from .blank_file import (
 from .camera_file import (
     CAMERA_KIND as CAMERA_KIND,
     TYPICAL_FLICKER as TYPICAL_FLICKER,
+    TYPICAL_SHUTTER_S as TYPICAL_SHUTTER_S,
     CameraFile as CameraFile,
     Linearity as Linearity,
     Noise as Noise,
     Settings as Settings,
     relative_sensitivity as relative_sensitivity,
+    shutter_sigma as shutter_sigma,
 )
 from .fade_file import (
     FADE_KIND as FADE_KIND,

@@ -12,6 +12,8 @@ from labrig.optics import CameraModel, f_number_text
 
 #: Flicker without a calibration: shutters, apertures and lamps scatter by 0.5 to 1 % (1 σ).
 TYPICAL_FLICKER = 0.007
+#: Error of a shutter in s without a calibration (1 σ).
+TYPICAL_SHUTTER_S = 2e-4
 
 
 class Noise(FrozenModel):
@@ -194,3 +196,29 @@ def relative_sensitivity(
         value *= (reference_f_number / f_number) ** 2
         sigma = math.hypot(sigma, APERTURE_SIGMA)
     return value, sigma
+
+
+def shutter_sigma(camera: CameraFile | None, exposure_s: float) -> float:
+    """Return the relative σ of an exposure time: that of its calibration, else a typical one.
+
+    Parameters
+    ----------
+    camera
+        Calibration of the camera; None without one.
+    exposure_s
+        Exposure time in seconds, above 0.
+
+    Returns
+    -------
+    float
+        Standard uncertainty over the exposure time.
+
+    Examples
+    --------
+    >>> from labrig.calibration import shutter_sigma
+    >>> shutter_sigma(None, 0.1)
+    0.002
+    """
+    if camera is None or not camera.shutter:
+        return TYPICAL_SHUTTER_S / float(exposure_s)
+    return camera.exposure_s(float(exposure_s))[1]

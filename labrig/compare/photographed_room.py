@@ -22,6 +22,7 @@ from labrig.calibration import (
     FadeFile,
     IrradianceFile,
     relative_sensitivity,
+    shutter_sigma,
 )
 from labrig.foundation import resources
 from labrig.foundation.arrays import FloatArray
@@ -121,8 +122,6 @@ ANY_LUX = 1000.0
 FADE_STEPS, DARK = 12, 1e-3
 #: Edges of the steps in which the lamp's housing warms, in its time constants.
 WARMING_STEPS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)
-#: Error of a shutter in s that was not calibrated (1 σ).
-SHUTTER_S = 2e-4
 #: Names of what was photographed under the lamp.
 SAMPLE, CARD = "the sample", "the grey card"
 
@@ -335,15 +334,11 @@ class PhotographedRoom:
         return ReflectedLight(
             SAMPLE,
             lit.values[best],
-            float(np.hypot(np.hypot(noise, flicker), self.shutter_sigma(record.exposure_s))),
+            float(
+                np.hypot(np.hypot(noise, flicker), shutter_sigma(self.camera, record.exposure_s))
+            ),
             (record.start_time + record.end_time) / 2 - self._began_s,
         )
-
-    def shutter_sigma(self, exposure_s: float) -> float:
-        """Return the relative σ of an exposure time in s."""
-        if self.camera is None:
-            return SHUTTER_S / exposure_s
-        return self.camera.exposure_s(exposure_s)[1]
 
     def burning_s(self) -> float:
         """Return a time in s at which the lamp burns, before the first decay."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from labrig.acquire import read_result_rig
 from labrig.bench_optics import with_shipped_camera
+from labrig.calibration import shutter_sigma
 from labrig.compare.glow import GlowComparison, compare_scaled, glow_sigma
 from labrig.compare.nalbach2017 import emission
 from labrig.compare.photographed_room import SAMPLE, DarkRoomScene, PhotographedRoom, ReflectedLight
@@ -178,7 +179,7 @@ def _ratio(
     channel = int(np.argmax(series.values.sum(axis=0)))
     photographed = series.values[:, channel] / light.values[channel]
     noise = np.nan_to_num(series.sigma[:, channel]) / light.values[channel]
-    shutter = np.array([room.shutter_sigma(exposure_s) for exposure_s in series.exposure_s])
+    shutter = np.array([shutter_sigma(room.camera, exposure_s) for exposure_s in series.exposure_s])
     common = np.sqrt(patch.flicker**2 + light.relative_sigma**2 + shutter**2)
     ratios = {name: values[:, channel] / reference[channel] for name, values in rendered.items()}
     return GlowRatio(

@@ -28,7 +28,7 @@ from labrig.bench_optics import (
     card_reflectance,
     illuminance_lx,
 )
-from labrig.calibration import BLANK_KIND, CAMERA_KIND, LVF_KIND
+from labrig.calibration import BLANK_KIND, CAMERA_KIND, LVF_KIND, TYPICAL_SHUTTER_S
 from labrig.fit import fit_luminance
 from labrig.foundation.arrays import BoolArray, FloatArray, IntArray
 from labrig.foundation.errors import DataError
@@ -41,7 +41,7 @@ from labrig.protocols.luminance.analysis.colour_of_glow import (
     colour_scale,
     emission_of,
 )
-from labrig.protocols.luminance.analysis.glow_ratios import SHUTTER_S, GlowRatios, glow_ratios
+from labrig.protocols.luminance.analysis.glow_ratios import GlowRatios, glow_ratios
 from labrig.protocols.luminance.protocol import GlowUnit, LuminanceFrames
 from labrig.protocols.luminance.result import (
     ExcitationState,
@@ -276,7 +276,9 @@ def _factors(
         yield ScaleFactor("reflectance of the card", scale.card_sigma, scale.card_source)
     yield ScaleFactor("light of the card", counts.card_sigma, "its photographs, noise and flicker")
     calibrated = camera is not None and camera.shutter
-    shutter = "the camera's calibration" if calibrated else f"assumed: {1e3 * SHUTTER_S:g} ms"
+    shutter = (
+        "the camera's calibration" if calibrated else f"assumed: {1e3 * TYPICAL_SHUTTER_S:g} ms"
+    )
     yield ScaleFactor("shutter times, card to glow", counts.shutter_sigma, shutter)
     yield ScaleFactor("aperture, card to glow", 0.0, "the same for all frames")
     colour = scale.relative_sigma

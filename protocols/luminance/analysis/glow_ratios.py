@@ -11,15 +11,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.calibration import TYPICAL_FLICKER, CameraFile
+from labrig.calibration import TYPICAL_FLICKER, CameraFile, shutter_sigma
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
 from labrig.reduce import SeriesFrame, reduce_patches
 from labrig.results import Measured, Series
 
-#: Error of a shutter in seconds, and of the ratio of two sensitivities, not calibrated (1 σ).
-SHUTTER_S, ISO_RATIO = 2e-4, 0.02
+#: Error of the ratio of two sensitivities, not calibrated (1 σ).
+ISO_RATIO = 0.02
 #: Range of ln t about a change of ISO in which frames tell the ratio.
 NEAR_CHANGE = math.log(2.0)
 
@@ -127,7 +127,7 @@ def glow_ratios(
         iso=isos[order],
         dark_sigma=dark[order],
         card_sigma=math.hypot(float(noise), flicker) / math.sqrt(len(lit.t_s)),
-        shutter_sigma=math.hypot(_shutter_sigma(camera, lit.exposure_s[0]), float(shutter.min())),
+        shutter_sigma=math.hypot(shutter_sigma(camera, lit.exposure_s[0]), float(shutter.min())),
         iso_sigma=iso_sigma[order],
         iso_source="nominal" if camera is None else "the camera's calibration",
         ambient=_ambient(name, region, darks, card_dn, settings, camera),
@@ -167,7 +167,7 @@ def _at_iso(
         iso=series.iso,
         dark=np.broadcast_to(np.nan_to_num(series.dark_sigma) * per_card, ratio.shape),
         iso_sigma=np.full(n, gain_sigma),
-        shutter=np.array([_shutter_sigma(camera, at_s) for at_s in series.exposure_s]),
+        shutter=np.array([shutter_sigma(camera, at_s) for at_s in series.exposure_s]),
     )
 
 
@@ -188,12 +188,6 @@ def _gain(
     (own, own_sigma), (of_card, card_sigma) = camera.scale(*settings), camera.scale(*card)
     calibrated = own_sigma > 0 or settings[0] == camera.iso
     return own / of_card, math.hypot(own_sigma, card_sigma, 0.0 if calibrated else ISO_RATIO)
-
-
-def _shutter_sigma(camera: CameraFile | None, exposure_s: float) -> float:
-    if camera is None or not camera.shutter:
-        return SHUTTER_S / float(exposure_s)
-    return camera.exposure_s(float(exposure_s))[1]
 
 
 def _ambient(
