@@ -1,6 +1,6 @@
 """Time from the last frame of a run to its result, and what reducing ahead costs the shots.
 
-    python -m tests.acceptance.reduced_ahead [--pace 5] [--rounds 1] [--kills 20] [--seed 1]
+    python -m tests.acceptance.reduced_ahead [--pace 3] [--rounds 1] [--kills 6] [--seed 1]
 
 The shipped decay, recorded in the simulated room by a camera of 21 megapixels, is recorded anew
 from its frames, one each `--pace` seconds by the clock of this PC, with a process that reduces
@@ -83,9 +83,9 @@ def killed(folder: Path, after_s: float) -> Iterator[None]:
 def main() -> None:
     """Print the times, and how many results differ."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--pace", type=float, default=5.0)
+    parser.add_argument("--pace", type=float, default=3.0)
     parser.add_argument("--rounds", type=int, default=1)
-    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--kills", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     differing = 0

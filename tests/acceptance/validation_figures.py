@@ -572,7 +572,7 @@ FIGURES = (
         figure.overheads,
     ),
     Figure(
-        "A decay of 58 frames of 21 megapixels, one each 5 s, on two cores: time from the last one "
+        "A decay of 58 frames of 21 megapixels, one each 3 s, on two cores: time from the last one "
         "to the result with a process that reduces frames as they come, and without; how late a "
         "frame begins and how long it takes to be kept, at 99 %",
         "reduced_ahead",
