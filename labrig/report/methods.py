@@ -340,7 +340,7 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     others = [LAW_LABELS[name] for name in LAW_NAMES if name != EXPONENTIALS]
     yield (
         f"Other laws were fitted to the same data: {listed(others)}; another law than exponentials "
-        "is taken if its BIC is lower by 2, by 6 if it contains them."
+        "is taken if its BIC is lower by 1, by 6 if it contains them."
     )
     yield "Uncertainties are standard uncertainties (1 σ) from the covariance of the fit."
 

@@ -47,6 +47,7 @@ STATED = {
         f"$\\beta$ is more than {fit_warnings.BEND_SIGMAS:.0f} σ from zero",
         f"on a grid of {rate_spectrum.RATES} rates",
         f"better by more than {selection.PREFERRED_BIC:.0f} in BIC",
+        f"must be better by {selection.THREE_BIC:.0f} themselves",
         f"better by more than {STRONG_EVIDENCE_DELTA_BIC:.0f} "
         f"(odds of {round(math.exp(STRONG_EVIDENCE_DELTA_BIC / 2), -1):.0f} to 1)",
     ],

@@ -56,6 +56,15 @@ def test_the_law_is_chosen_by_which_the_signal_decays(
     assert all(fit.compared_laws[0].bic_above_best == 0 for fit in fits)
 
 
+def test_a_trap_that_hardly_retraps_is_taken_from_odds_of_two_on() -> None:
+    """Its BIC is lower by 1.8 than that of two exponentials, which have one parameter more."""
+    fit = fitted("otor", 0.15, 419)
+    two = next(each.bic for each in fit.candidates if each.n_states == 2)
+    of_law = next(each.bic for each in fit.laws if each.name == "otor")
+    assert 1 < two - of_law < 2
+    assert fit.law == "otor"
+
+
 def test_exponentials_stay_exponentials() -> None:
     signal = exponential_means(np.array([0.2, 0.02]), T_S, EXPOSURE_S) @ [0.7, 0.3]
     for seed in range(200, 205):

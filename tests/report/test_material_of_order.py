@@ -61,6 +61,7 @@ def test_what_is_not_known_is_not_compared() -> None:
 
 def test_what_is_at_its_bound_is_text_of_its_limit(tmp_path: Path) -> None:
     blue = read_material("blue-paint")
+    assert blue.states[0].k_e_per_s is not None
     update = {
         "kinetic_order": 1.0, "kinetic_order_sigma": 0.02, "kinetic_order_limit_95": 1.0329,
         "r0": 1.0, "r0_sigma": 0.01, "k_e_per_s": (0.0, *(blue.states[0].k_e_per_s or ())[1:]),

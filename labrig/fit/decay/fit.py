@@ -128,7 +128,7 @@ def fit_decay(
     law
         Law that describes the decay: `exponentials`, `becquerel`, `otor`, `stretched` or
         `rate-spectrum`. `auto` takes exponentials, unless no number of states was asked for and the
-        BIC of another law is lower by 2, by 6 than that of a single one or if it is a spectrum of
+        BIC of another law is lower by 1, by 6 than that of a single one or if it is a spectrum of
         rates. All of them are fitted in any case.
     intervals
         Whether every rate, and every parameter of the law, has an interval by profile likelihood.
