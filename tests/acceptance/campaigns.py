@@ -227,11 +227,10 @@ CAMPAIGNS = {
         _module(
             "kills_in_every_protocol",
             *("decay", "fade", "blank", "camera_calibration", "saturation", "isotropy"),
-            *("--rounds", "12"),
         ),
         _module("disk_failures", "--every", "3", "--bytes", "100", "--mounted", "20"),
         _module("devices_vanish", "--every", "40"),
-        _module("file_grammars", "--cases", "100000"),
+        _module("file_grammars", "--cases", "20000"),
         _module("long_run", "--hours", "24", "--every", "30"),
         _module("mutated_files", "--cases", "10000"),
         _module("edited_journals"),

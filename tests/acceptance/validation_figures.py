@@ -399,7 +399,7 @@ FIGURES = (
         figure.wrong,
     ),
     Figure(
-        "kill -9 at 216 random moments of six of the shipped protocols and of the making of their "
+        "kill -9 at random moments of six of the shipped protocols and of the making of their "
         "results; resumed until complete, compared with an undisturbed run",
         "kills_in_every_protocol",
         figure.kills,
@@ -418,7 +418,7 @@ FIGURES = (
     ),
     Figure(
         "Matrices in BFC and ARK files, camera curves and linear OpenEXR pictures by grammars of "
-        "which some rules are broken, 100 000 of each: refused with one line, or read",
+        "which some rules are broken, 20 000 of each: refused with one line, or read",
         "file_grammars",
         figure.went_wrong,
     ),
