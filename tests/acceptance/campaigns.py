@@ -230,7 +230,7 @@ CAMPAIGNS = {
         ),
         _module("disk_failures", "--every", "3", "--bytes", "100", "--mounted", "20"),
         _module("devices_vanish", "--every", "40"),
-        _module("file_grammars", "--cases", "20000"),
+        _module("file_grammars", "--cases", "100000"),
         _module("long_run", "--hours", "24", "--every", "30"),
         _module("mutated_files", "--cases", "10000"),
         _module("edited_journals"),

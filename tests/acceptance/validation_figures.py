@@ -418,7 +418,7 @@ FIGURES = (
     ),
     Figure(
         "Matrices in BFC and ARK files, camera curves and linear OpenEXR pictures by grammars of "
-        "which some rules are broken, 20 000 of each: refused with one line, or read",
+        "which some rules are broken, 100 000 of each: refused with one line, or read",
         "file_grammars",
         figure.went_wrong,
     ),
