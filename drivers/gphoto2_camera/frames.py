@@ -95,8 +95,10 @@ class Frames:
     def _wait(self) -> tuple[str, str] | None:
         deadline_s = (self._due_after_s or self._clock.now()) + self._timeout_s
         while True:
+            # Looked at before the camera: this process may be stopped between the two.
+            is_last = self._clock.now() >= deadline_s
             file = self._library.next_file(LISTEN_S, self._timeout_s)
-            if file is not None or self._clock.now() >= deadline_s:
+            if file is not None or is_last:
                 return file
 
 

@@ -130,11 +130,14 @@ class HelperProcess:
         """Return whether there is an answer; a request to stop is noticed meanwhile."""
         assert self._pipe is not None
         deadline_s = self._clock.now() + within_s
-        while not self._pipe.poll(min(CHECK_INTERVAL_S, max(0.0, deadline_s - self._clock.now()))):
-            if self._clock.now() >= deadline_s:
+        while True:
+            # Looked at before the pipe: this process may be stopped between the two.
+            left_s = deadline_s - self._clock.now()
+            if self._pipe.poll(min(CHECK_INTERVAL_S, max(0.0, left_s))):
+                return True
+            if left_s <= 0:
                 return False
             self._clock.sleep(0.0)
-        return True
 
     def _exit_code(self) -> int | None:
         """Return the exit code of a process that has closed its end of the pipe."""

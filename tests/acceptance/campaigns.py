@@ -227,7 +227,6 @@ CAMPAIGNS = {
         _module(
             "kills_in_every_protocol",
             *("decay", "fade", "blank", "camera_calibration", "saturation", "isotropy"),
-            *("--rounds", "12"),
         ),
         _module("disk_failures", "--every", "3", "--bytes", "100", "--mounted", "20"),
         _module("devices_vanish", "--every", "40"),

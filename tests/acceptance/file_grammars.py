@@ -222,6 +222,7 @@ def main() -> None:
     wrong: list[str] = []
     number = 0
     print(f"{'file':16}{'cases':>8}{'read':>8}{'refusals':>10}{'kinds':>7}{'wrong':>7}  longest")
+    warnings.simplefilter("error", RuntimeWarning)  # else a line of numpy's on the terminal
     with tempfile.TemporaryDirectory() as name:
         for kind in [asked.kind] if asked.kind else KINDS:
             tally = Tally()

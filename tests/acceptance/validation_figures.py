@@ -399,7 +399,7 @@ FIGURES = (
         figure.wrong,
     ),
     Figure(
-        "kill -9 at 216 random moments of six of the shipped protocols and of the making of their "
+        "kill -9 at random moments of six of the shipped protocols and of the making of their "
         "results; resumed until complete, compared with an undisturbed run",
         "kills_in_every_protocol",
         figure.kills,

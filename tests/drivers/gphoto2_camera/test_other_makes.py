@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,7 @@ import pytest
 
 from labrig.acquire import ExposureSettings
 from labrig.drivers.gphoto2_camera import Gphoto2Camera
-from labrig.foundation.clock import VirtualClock
+from labrig.foundation.clock import SystemClock, VirtualClock
 from labrig.foundation.errors import DeviceError, UsageError
 
 from .bench import JPEG, TIFF, FastClock, Loopback, ToyBench
@@ -159,9 +160,33 @@ def test_busy_may_mean_that_it_has_released_all_the_same(toy: ToyBench) -> None:
 
 
 def test_a_camera_that_is_busy_while_its_frame_is_awaited(toy: ToyBench) -> None:
-    with toy.connected({}, {"files": [NEF], "busy_waits": 3}, clock=FastClock()) as camera:
+    with toy.connected({}, {"files": [NEF], "busy_s": 0.1}, clock=FastClock()) as camera:
         camera.configure(SETTINGS)
         assert camera.shoot().data == bytes.fromhex(NEF[1])
+
+
+class StoppedClock(SystemClock):
+    """The clock of a process that is stopped for a second as it asks for the time."""
+
+    readings_left = -1
+
+    def now(self) -> float:
+        self.readings_left -= 1
+        if self.readings_left == 0:
+            time.sleep(1.0)  # meanwhile libgphoto2 goes on
+        return super().now()
+
+
+def test_a_frame_is_there_after_a_stop_at_any_moment(toy: ToyBench) -> None:
+    clock, moments = StoppedClock(), range(3, 17)
+    described = {"files": [NEF] * len(moments), "busy_s": 0.25}
+    with toy.connected({}, described, clock=clock, transfer_timeout="0.5 s") as camera:
+        camera.configure(SETTINGS)
+        for moment in moments:
+            camera.arm()
+            clock.readings_left = moment
+            assert camera.shoot().data == bytes.fromhex(NEF[1])
+            assert clock.readings_left < 0
 
 
 @pytest.mark.campaign

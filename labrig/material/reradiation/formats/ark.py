@@ -111,7 +111,8 @@ def parse_ark_matrix(entry: ArkEntry) -> ReradiationMatrix:
         raise ValueError(
             f"line {scale.number}: expected a maximum sample value above 0, got {largest:g}"
         )
-    values = _samples(entry) / largest
+    with np.errstate(over="ignore"):  # what is infinite is refused below
+        values = _samples(entry) / largest
     for row in values:
         check_fractions(row.tolist(), f"line {entry.samples[0].number}")
     output_nm = _grid(entry, "Reflectance", values.shape[0])

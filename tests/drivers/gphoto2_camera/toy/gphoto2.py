@@ -6,6 +6,7 @@ to the file beside it with `.log`.
 
 import json
 import os
+import time
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +38,8 @@ class Toy:
         What each photograph delivers: pairs of name and content.
     busy
         So many triggers are answered "busy" first, although they are obeyed.
-    busy_waits
-        So many waits for an event are answered "busy" first.
+    busy_s
+        For so many seconds after a trigger waits for an event are answered "busy".
     preview
         The live picture; empty where there is no live view.
     models
@@ -52,7 +53,7 @@ class Toy:
         self.stuck: list[str] = content.get("stuck", [])
         self.files: list[list[str]] = content.get("files", [])
         self.busy: int = content.get("busy", 0)
-        self.busy_waits: int = content.get("busy_waits", 0)
+        self.busy_s: float = content.get("busy_s", 0.0)
         self.preview = bytes.fromhex(content.get("preview", ""))
         self.models: dict[str, str] = content.get("models", {})
 
@@ -105,6 +106,7 @@ class Camera:
     def __init__(self) -> None:
         self._toy = Toy()
         self._reported: list[list[str]] = []
+        self._busy_until_s = 0.0
         self._kept: dict[str, bytes] = {}
 
     def set_port_info(self, info: str) -> None:
@@ -131,6 +133,7 @@ class Camera:
 
     def trigger_capture(self) -> None:
         self._toy.log("trigger")
+        self._busy_until_s = time.monotonic() + self._toy.busy_s
         if self._toy.files:
             self._reported.append(self._toy.files.pop(0))
         if self._toy.busy:
@@ -138,8 +141,7 @@ class Camera:
             raise GPhoto2Error(GP_ERROR_CAMERA_BUSY)
 
     def wait_for_event(self, _timeout_ms: int) -> tuple[int, Any]:
-        if self._toy.busy_waits:
-            self._toy.busy_waits -= 1
+        if time.monotonic() < self._busy_until_s:
             raise GPhoto2Error(GP_ERROR_CAMERA_BUSY)
         if not self._reported:
             return GP_EVENT_TIMEOUT, None
