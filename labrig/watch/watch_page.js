@@ -112,19 +112,27 @@ function step(when, what, kind) {
   return entry;
 }
 
+/** What there is to do without a unit under way; it stays as it is, so that its link can be clicked. */
+function showEnd(status) {
+  if ($("steps").dataset.end === status) return;
+  $("steps").dataset.end = status;
+  const entry = tag("li", `${NOTHING_NEXT[status]} `, "alone");
+  if (status === "processed") {
+    const link = tag("a", "Open the report");
+    link.href = "result/report.html";
+    entry.append(link);
+  }
+  $("steps").replaceChildren(entry);
+}
+
 function showSteps() {
   const standing = state.run.now;
   $("unit").textContent = standing ? state.units[standing.unit].name : "";
   if (!standing) {
-    const entry = tag("li", `${NOTHING_NEXT[state.run.status]} `, "alone");
-    if (state.run.status === "processed") {
-      const link = tag("a", "Open the report");
-      link.href = "result/report.html";
-      entry.append(link);
-    }
-    $("steps").replaceChildren(entry);
+    showEnd(state.run.status);
     return;
   }
+  delete $("steps").dataset.end;
   const at = position();
   const past = standing.done.map(({ time, what }) => step(`${duration(now() - time)} ago`, what, "past"));
   // of what has begun, only the last is under way

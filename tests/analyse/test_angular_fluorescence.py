@@ -194,7 +194,7 @@ def test_a_region_that_cuts_the_outline_is_named_and_no_dependence(
     assert result.p > 0.2
     line = next(str(each) for each in result.warnings if each.code == "outline-cut")
     for side, px in sides.items():
-        named = re.search(rf"{side} by (\d+) px \((\d+)% of its radius\)", line)
+        named = re.search(rf"{side} by (\d+) px \((\d+) % of its radius\)", line)
         assert named is not None
         assert int(named[1]) == pytest.approx(px, abs=1)
         assert int(named[2]) == pytest.approx(100 * px / 90, abs=1.5)
@@ -285,7 +285,7 @@ def test_the_page_answers_with_p_and_power(planted: Path) -> None:
     assert all(each.startswith("budget") for each in budgets)
     assert line.startswith("angular fluorescence: re-radiation depends on angle (p < ")
     assert "from 30° to 120°, vertical, 365 nm, it changes by −" in line
-    assert "would have been found with 90% power" in line
+    assert "would have been found with 90 % power" in line
     page = done.report.read_text()
     assert "Re-radiation depends on angle" in page
     rows = (done.report.parent / "angular.csv").read_text().splitlines()
