@@ -45,7 +45,8 @@ def reduced_ahead(*, wanted: bool = True) -> Iterator[Begun]:
 
     def begun(folder: Path, size: RunSize) -> None:
         if wanted and size.frames_bytes >= WORTHWHILE_BYTES:
-            processes.append(_started(folder))
+            with suppress(OSError):  # the system has no room for one more
+                processes.append(_started(folder))
 
     try:
         yield begun

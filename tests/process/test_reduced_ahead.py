@@ -114,6 +114,17 @@ def test_no_process_where_it_is_not_wanted_or_not_worth_it(
         assert not processes_of(run)
 
 
+def test_a_run_goes_on_where_the_system_starts_no_process(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_room(*_: object, **__: object) -> None:
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr("labrig.foundation.own_process.subprocess.Popen", no_room)
+    with reduced_ahead() as begun:
+        begun(run, LARGE)
+
+
 def wait_until(is_so: Callable[[], bool]) -> None:
     deadline = time.monotonic() + PATIENCE_S
     while not is_so():
