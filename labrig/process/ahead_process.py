@@ -26,10 +26,16 @@ def main() -> None:
 
 
 def _become_idle() -> None:
-    """Take the processors only while nothing else wants them; on Windows it was started so."""
+    """Take the processors only while nothing else wants them; on Windows it was started so.
+
+    One processor is left alone: to take another one back takes some milliseconds.
+    """
     if sys.platform == "win32":
         return
     os.nice(19)
+    if hasattr(os, "sched_setaffinity"):
+        first, *others = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, others or {first})
     if hasattr(os, "SCHED_IDLE"):
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
