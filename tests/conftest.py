@@ -306,16 +306,18 @@ def make_protocol(tmp_path: Path) -> Callable[..., Path]:
     return write
 
 
+SHORT_DECAY: dict[str, Any] = {
+    "protocol": "decay",
+    "sample": {"name": "test"},
+    "charge": "15 min",
+    "for": "60 s",
+    "exposure": "1 s",
+}
+
+
 def write_short_decay(path: Path, **keys: object) -> Path:
     """Write a short decay protocol, changed as told."""
-    content = {
-        "protocol": "decay",
-        "sample": {"name": "test"},
-        "charge": "15 min",
-        "for": "60 s",
-        "exposure": "1 s",
-    } | keys
-    path.write_text(write_quickly(content), encoding="utf-8")
+    path.write_text(write_quickly(SHORT_DECAY | keys), encoding="utf-8")
     return path
 
 

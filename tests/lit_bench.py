@@ -277,9 +277,17 @@ def wait_for_guards(folder: Path) -> None:
 
 def _has_guard(folder: Path) -> bool:
     """Whether such a guard runs; it has the environment of its labrig."""
-    for process in Path("/proc").glob("[0-9]*"):
+    for process in started_with(b"labrig.bench.guard_process"):
         with suppress(OSError):
-            is_guard = b"labrig.bench.guard_process" in (process / "cmdline").read_bytes()
-            if is_guard and bytes(folder) in (process / "environ").read_bytes():
+            if bytes(folder) in (process / "environ").read_bytes():
                 return True
     return False
+
+
+def started_with(*words: bytes) -> Iterator[Path]:
+    """Folders in /proc of the processes whose command line has all of these words."""
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):  # it has ended
+            line = (process / "cmdline").read_bytes()
+            if all(word in line for word in words):
+                yield process

@@ -13,7 +13,7 @@ WriteFrame = Callable[[Path, bytes], None]
 
 
 class Replay:
-    """What `run` recorded, recorded anew into `folder`: each frame before its journal line."""
+    """A recorded run that is recorded anew into `folder`: each frame before its journal line."""
 
     def __init__(self, run: Path, folder: Path, write: WriteFrame = write_durably) -> None:
         self.folder, self._run, self._write = folder, run, write

@@ -43,8 +43,8 @@ def lights_that_read_back(rig: Rig) -> dict[str, bool]:
 class LightReadback:
     """Comparison of the lights' states with those commanded, for boards that read back.
 
-    What guards the rig's lights is told whether one may be on; a light that cannot be read back may
-    be on at any time.
+    It reports to the guard of the rig's lights whether one may be on; a light that cannot be read
+    back may be on at any time.
 
     Parameters
     ----------

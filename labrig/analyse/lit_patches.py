@@ -10,7 +10,7 @@ import numpy as np
 from labrig.analyse.frames import require_calibrated_camera, steady_frames
 from labrig.analyse.inputs import AnalysisContext
 from labrig.bench_optics import LightSource
-from labrig.calibration import CAMERA_KIND, TYPICAL_FLICKER
+from labrig.calibration import CAMERA_KIND, flicker_of
 from labrig.fit.fluorescence import Exposure, FluorescenceSystem, fluorescence_system
 from labrig.fit.leds import CURVES_OF_MODEL, SKEW_SIGMA, WIDTH_SIGMA
 from labrig.fit.spectrum import CurveError
@@ -145,7 +145,7 @@ def lit_patches(
         Frames are missing, damaged, or of another camera than the calibrated one.
     """
     camera = context.inputs[CAMERA_KIND]
-    flicker = TYPICAL_FLICKER if camera is None else camera.flicker
+    flicker = flicker_of(camera)
     lit, left = (_series(context, each, patches) for each in (role, f"{role}-off"))
     units = [f"{begin}{light}" for light in lights]
     again = None if first is None else (f"{begin}{first}", f"{AGAIN}{first}")

@@ -81,7 +81,7 @@ class Guard:
 
     @property
     def is_started(self) -> bool:
-        """Whether a light may have been lit since the devices were opened."""
+        """The guard was started: a light may have been lit since the devices were opened."""
         return self._process is not None
 
     def lights_may_be_on(self, may_be: bool) -> None:

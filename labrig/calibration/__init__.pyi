@@ -10,6 +10,7 @@ from .camera_file import (
     Linearity as Linearity,
     Noise as Noise,
     Settings as Settings,
+    flicker_of as flicker_of,
     relative_sensitivity as relative_sensitivity,
     shutter_sigma as shutter_sigma,
 )

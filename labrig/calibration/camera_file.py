@@ -198,6 +198,28 @@ def relative_sensitivity(
     return value, sigma
 
 
+def flicker_of(camera: CameraFile | None) -> float:
+    """Return the relative flicker of a frame: that of its calibration, else a typical one.
+
+    Parameters
+    ----------
+    camera
+        Calibration of the camera; None without one.
+
+    Returns
+    -------
+    float
+        Standard deviation over the signal.
+
+    Examples
+    --------
+    >>> from labrig.calibration import flicker_of
+    >>> flicker_of(None)
+    0.007
+    """
+    return TYPICAL_FLICKER if camera is None else camera.flicker
+
+
 def shutter_sigma(camera: CameraFile | None, exposure_s: float) -> float:
     """Return the relative σ of an exposure time: that of its calibration, else a typical one.
 

@@ -15,12 +15,12 @@ from labrig.calibration import (
     CAMERA_KIND,
     FADE_KIND,
     IRRADIANCE_KIND,
-    TYPICAL_FLICKER,
     CalibrationKind,
     CameraFile,
     CardLight,
     FadeFile,
     IrradianceFile,
+    flicker_of,
     relative_sensitivity,
     shutter_sigma,
 )
@@ -330,7 +330,7 @@ class PhotographedRoom:
             if frame.path.name == lit.frame[best]
         )
         noise = float(np.max(np.nan_to_num(lit.sigma[best]) / lit.values[best]))
-        flicker = TYPICAL_FLICKER if self.camera is None else self.camera.flicker
+        flicker = flicker_of(self.camera)
         return ReflectedLight(
             SAMPLE,
             lit.values[best],

@@ -85,6 +85,14 @@ def whereabouts(path: Path) -> str:
     return ""
 
 
+def file_size_bytes(path: Path) -> int:
+    """Return the size of a file; 0 of one that cannot be looked at, which reading it reports."""
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
 def read_bytes(path: Path, most_bytes: int) -> bytes:
     """Read the bytes of the file at `path`.
 

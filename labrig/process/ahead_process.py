@@ -51,12 +51,13 @@ def _follow(run: Path, ended: threading.Event) -> None:
     """Process a run whenever its journal has grown."""
     # Not above: by now it gets no time that others want.
     from labrig.foundation.clock import SystemClock
+    from labrig.foundation.input_file import file_size_bytes
     from labrig.process.run import process_so_far
     from labrig.record import JOURNAL
 
     clock, size_bytes, pause_s = SystemClock(), 0, PAUSE_S
     while not ended.wait(pause_s):
-        before_bytes, size_bytes = size_bytes, _size_bytes(run / JOURNAL)
+        before_bytes, size_bytes = size_bytes, file_size_bytes(run / JOURNAL)
         if size_bytes == before_bytes:
             continue
         began_s = clock.now()
@@ -65,13 +66,6 @@ def _follow(run: Path, ended: threading.Event) -> None:
         with suppress(Exception):
             process_so_far(run)
         pause_s = max(PAUSE_S, PAUSE_PER_PASS * (clock.now() - began_s))
-
-
-def _size_bytes(file: Path) -> int:
-    try:
-        return file.stat().st_size
-    except OSError:
-        return 0
 
 
 if __name__ == "__main__":

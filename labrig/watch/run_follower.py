@@ -22,6 +22,7 @@ from labrig.acquire import (
 )
 from labrig.catalogue import RunStatus, status_of
 from labrig.foundation.errors import DataError, LabrigError
+from labrig.foundation.input_file import file_size_bytes
 from labrig.foundation.region import Region
 from labrig.record import UNDONE, ActionRecord, Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
@@ -180,7 +181,10 @@ class RunFollower:
         DataError
             If the journal is damaged.
         """
-        sizes = _size(self.run / "journal.jsonl"), _size(self.run / "result" / "report.html")
+        sizes = (
+            file_size_bytes(self.run / "journal.jsonl"),
+            file_size_bytes(self.run / "result" / "report.html"),
+        )
         if sizes[0] and sizes != self._last_look[:2]:
             self._record = read_run(self.run)
         is_complete = len(self._record.completed()) == len(self._plan.units)
@@ -386,7 +390,3 @@ def _frame_state(frame: FrameRecord, preview: Preview) -> dict[str, Any]:
         "width": preview.picture.shape[1],
         "height": preview.picture.shape[0],
     }
-
-
-def _size(path: Path) -> int:
-    return path.stat().st_size if path.exists() else 0

@@ -7,7 +7,7 @@ import numpy as np
 from labrig.analyse.frame_times import timing_warnings
 from labrig.analyse.frames import intact_frames, require_calibrated_camera, without_stray_light
 from labrig.analyse.inputs import AnalysisContext
-from labrig.calibration import BLANK_KIND, CAMERA_KIND, TYPICAL_FLICKER
+from labrig.calibration import BLANK_KIND, CAMERA_KIND, flicker_of
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.result_warning import Contradiction, Disturbance, ResultWarning
@@ -38,7 +38,7 @@ def analyse(context: AnalysisContext) -> IsotropyResult:
     require_calibrated_camera(camera, run, run.frames(protocol.role))
     regions = context.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
-    flicker = TYPICAL_FLICKER if camera is None else camera.flicker
+    flicker = flicker_of(camera)
     encloses_sample = protocol.patch == "around"
     angles_deg = {f"angle-{angle}": angle for angle in protocol.angles}
     patches = {

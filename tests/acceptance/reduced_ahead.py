@@ -30,6 +30,7 @@ from labrig.process import process_run, reduced_ahead
 from labrig.record import RunSize
 from labrig.reduce import WORTHWHILE_BYTES
 from tests.analyse.recorded import recorded, shipped_rig
+from tests.lit_bench import started_with
 from tests.quick_yaml import read_quickly
 from tests.replayed import Replay
 
@@ -63,13 +64,8 @@ def killed(folder: Path, after_s: float) -> Iterator[None]:
     """Kill the process that reduces the frames of runs in a folder ahead, some time from now."""
 
     def kill() -> None:
-        for process in Path("/proc").glob("[0-9]*"):
-            try:
-                words = (process / "cmdline").read_bytes()
-            except OSError:
-                continue
-            if b"labrig.process.ahead_process" in words and bytes(folder) in words:
-                os.kill(int(process.name), signal.SIGKILL)
+        for process in started_with(b"labrig.process.ahead_process", bytes(folder)):
+            os.kill(int(process.name), signal.SIGKILL)
 
     timer = threading.Timer(after_s, kill)
     timer.start()

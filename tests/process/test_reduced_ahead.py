@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -17,16 +16,11 @@ from labrig.process.run import process_so_far
 from labrig.record import RunSize, read_run
 from labrig.reduce import WORTHWHILE_BYTES, RawFrame, read_raw
 from tests.analyse.recorded import recorded, shipped_rig
+from tests.conftest import SHORT_DECAY
+from tests.lit_bench import started_with
 from tests.replayed import Replay
 
 PATIENCE_S = 60.0
-DECAY = {
-    "protocol": "decay",
-    "sample": {"name": "test"},
-    "charge": "15 min",
-    "for": "60 s",
-    "exposure": "1 s",
-}
 #: Dark frames and most of the glow: 12 of 16 frames.
 BEGUN = 12
 #: A run that is worth a process, and one that is not.
@@ -35,7 +29,7 @@ LARGE, SMALL = (RunSize(10, size_bytes, 0) for size_bytes in (WORTHWHILE_BYTES, 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    return recorded(tmp_path / "bench", DECAY, shipped_rig("sim"))
+    return recorded(tmp_path / "bench", SHORT_DECAY, shipped_rig("sim"))
 
 
 def decoded(monkeypatch: pytest.MonkeyPatch, act: Callable[[], object]) -> set[str]:
@@ -134,9 +128,4 @@ def wait_until(is_so: Callable[[], bool]) -> None:
 
 def processes_of(run: Path) -> set[int]:
     """Processes, other than this one, whose command line names a run."""
-    found = set()
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if bytes(run) in (process / "cmdline").read_bytes():
-                found.add(int(process.name))
-    return found - {os.getpid()}
+    return {int(process.name) for process in started_with(bytes(run))} - {os.getpid()}

@@ -9,8 +9,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from labrig.process import process_run
 from labrig.protocols.decay import analysis
 from tests.analyse.recorded import recorded, shipped_rig
-
-DECAY = {"protocol": "decay", "sample": {"name": "test"}, "charge": "5 min", "for": "20 s"}
+from tests.conftest import SHORT_DECAY
 
 
 def blas_threads() -> set[int]:
@@ -29,6 +28,6 @@ def test_an_analysis_computes_in_one_thread(
 
     monkeypatch.setattr(analysis, "analyse", watched)
     with threadpool_limits(limits=2, user_api="blas"):
-        process_run(recorded(tmp_path, DECAY, shipped_rig("sim")))
+        process_run(recorded(tmp_path, SHORT_DECAY, shipped_rig("sim")))
         assert 2 in blas_threads()
     assert meanwhile == [{1}]

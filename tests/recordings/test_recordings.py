@@ -25,7 +25,7 @@ def test_results_are_those_that_were_kept(run: Recorded, tmp_path: Path) -> None
 
 
 def as_a_program_writes(page: str) -> list[str]:
-    """What a page shows of tags, exponents and carets, and numbers that stick to their %."""
+    """Tags, exponents and carets that a page shows, and numbers that stick to their %."""
     for hidden in (r"<(script|style|pre|code|svg)\b.*?</\1>", r"<[^>]*>"):
         page = re.sub(hidden, " ", page, flags=re.DOTALL)
     return re.findall(r".{0,25}(?:&lt;/?(?:su[bp]|[bi])\b|\d[eE][-+]?\d|\^|\d%).{0,15}", page)

@@ -17,6 +17,7 @@ from subprocess import PIPE, Popen
 from typing import IO, Any, Protocol, TypeVar
 
 from labrig.foundation.errors import DataError
+from labrig.foundation.input_file import file_size_bytes
 from labrig.foundation.own_process import own_process
 from labrig.foundation.processors import n_processors
 from labrig.foundation.signals import name_of
@@ -77,20 +78,13 @@ def worker_count(groups: Sequence[Paths]) -> int:
     groups
         Paths of the frames that are reduced together.
     """
-    sizes = [[_size_bytes(path) for path in group] for group in groups]
+    sizes = [[file_size_bytes(path) for path in group] for group in groups]
     if sum(map(sum, sizes)) < WORTHWHILE_BYTES:
         return 0
     largest = max(max(group, default=0) for group in sizes)
     worker_bytes = WORKER_BYTES + BYTES_PER_FILE_BYTE * largest
     fitting = (MEMORY_BYTES - OWN_BYTES) // worker_bytes
     return min(n_processors(), fitting, len(groups))
-
-
-def _size_bytes(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except OSError:  # reading it says what is wrong
-        return 0
 
 
 def texts_from_workers(
@@ -149,7 +143,8 @@ class _Worker:
             "labrig.reduce.workers.process",
             stdin=PIPE,
             stdout=PIPE,
-            env={**os.environ, "PYTHONPATH": _import_path()},
+            # A notebook has not set what the command line does: see `one_linear_algebra_thread`.
+            env={"OPENBLAS_NUM_THREADS": "1", **os.environ, "PYTHONPATH": _import_path()},
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

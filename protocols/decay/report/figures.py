@@ -1,5 +1,6 @@
 """Charts of a decay: its laws beyond the measurement, residuals, and their periodogram."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -88,6 +89,7 @@ def law_figure(series: Series, fit: FittedDecay) -> Chart:
     brightest = float(values[shown].max(initial=1e-30))
     low = BELOW * max(float(values[shown].min(initial=brightest)), 1e-4 * brightest)
     forecast = fit.forecast(t_s)
+    curves = {law.name: _curve(fit, law.name, t_s) for law in fit.compared_laws}
     later = t_s >= last_s
     marks: list[Mark] = [
         Band(MUTED, t_s[later], np.maximum(forecast.low[later], low), forecast.high[later])
@@ -99,33 +101,38 @@ def law_figure(series: Series, fit: FittedDecay) -> Chart:
         colour, style = _LINES[law.name]
         chosen = law.name == fit.law
         width_pt = 2.0 if chosen else 1.0
-        marks.append(Line(colour, t_s, _curve(fit, law.name, t_s), width_pt, style))
+        marks.append(Line(colour, t_s, curves[law.name], width_pt, style))
         name = _SHORT.get(law.name, LAW_LABELS[law.name])
         legend.append((name, Line(colour, width_pt=width_pt, style=style)))
     marks.append(Points(INK, middle_s[shown], values[shown], size_pt=2.6))
-    for at_s in (last_s, FORECAST_SPANS * last_s):
-        ends = np.array([low, ABOVE * brightest])
-        marks.append(Line(MUTED, np.full(2, at_s), ends, 0.7, DOTTED))
+    marks += _end_of_knowledge(last_s, low, ABOVE * brightest)
     unit = f" / ({series.value_unit})" if series.value_unit else ""
     axis = logarithmic_axis(f"Signal{unit}", low, ABOVE * brightest)
     time = logarithmic_axis(time_label(fit), float(t_s[0]) / 1.1, float(t_s[-1]) * 1.1)
     margins = Margins(top=46.0, bottom=UPPER_PT)
     upper = Panel(time, axis, tuple(marks), margins, has_x_labels=False)
-    lower = _over_the_chosen_law(series, fit, time, t_s)
+    lower = _over_the_chosen_law(series, fit, time, t_s, curves, (forecast.low, forecast.high))
     return Chart((upper, lower), HEIGHT_PT, legend=tuple(legend), columns=3)
 
 
-def _over_the_chosen_law(series: Series, fit: FittedDecay, time: Axis, t_s: FloatArray) -> Panel:
+def _over_the_chosen_law(
+    series: Series,
+    fit: FittedDecay,
+    time: Axis,
+    t_s: FloatArray,
+    curves: Mapping[str, FloatArray],
+    band: tuple[FloatArray, FloatArray],
+) -> Panel:
     """Return values, laws and the band over the chosen law, on a linear axis about 1."""
-    chosen, last_s = _curve(fit, fit.law, t_s), fit.measured_until_s
+    chosen, last_s = curves[fit.law], fit.measured_until_s
     glows = chosen > GONE * chosen.max()
     t_s, chosen = t_s[glows], chosen[glows]
-    ratios = {law.name: _curve(fit, law.name, t_s) / chosen for law in fit.compared_laws}
+    ratios = {name: curve[glows] / chosen for name, curve in curves.items()}
     measured = t_s <= last_s
     farthest = max(float(np.abs(each - 1)[measured].max()) for each in ratios.values())
     reach = min(max(1.2 * farthest, NEAREST), WIDEST)
-    forecast, later = fit.forecast(t_s), t_s >= last_s
-    low, high = (np.clip(end / chosen, 0, 2)[later] for end in (forecast.low, forecast.high))
+    later = t_s >= last_s
+    low, high = (np.clip(end[glows] / chosen, 0, 2)[later] for end in band)
     marks: list[Mark] = [Band(MUTED, t_s[later], low, high)]
     for name, ratio in ratios.items():
         colour, style = _LINES[name]
@@ -142,11 +149,16 @@ def _over_the_chosen_law(series: Series, fit: FittedDecay, time: Axis, t_s: Floa
         ErrorBars(INK, middle_s, values[shown], np.nan_to_num(sigma)[shown]),
         Points(INK, middle_s, values[shown], size_pt=2.6),
     ]
-    ends = np.array([1 - reach, 1 + reach])
-    for at_s in (last_s, FORECAST_SPANS * last_s):
-        marks.append(Line(MUTED, np.full(2, at_s), ends, 0.7, DOTTED))
+    marks += _end_of_knowledge(last_s, 1 - reach, 1 + reach)
     axis = linear_axis("Over the chosen law", 1 - reach, 1 + reach, most=4)
     return Panel(time, axis, tuple(marks), Margins(top=LOWER_PT))
+
+
+def _end_of_knowledge(last_s: float, low: float, high: float) -> list[Mark]:
+    """Return the verticals at the end of the measurement, and where no value can be given."""
+    ends = np.array([low, high])
+    places_s = (last_s, FORECAST_SPANS * last_s)
+    return [Line(MUTED, np.full(2, at_s), ends, 0.7, DOTTED) for at_s in places_s]
 
 
 def _curve(fit: FittedDecay, law: str, t_s: FloatArray) -> FloatArray:

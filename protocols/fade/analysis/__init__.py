@@ -13,11 +13,11 @@ from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import (
     CAMERA_KIND,
     LVF_KIND,
-    TYPICAL_FLICKER,
     CameraFile,
     Change,
     FadeFile,
     Warming,
+    flicker_of,
 )
 from labrig.fit.spectrum import CurveError, camera_modes
 from labrig.foundation.arrays import FloatArray
@@ -247,7 +247,7 @@ def analyse(context: AnalysisContext) -> FadeResult:
     frames = part_frames(context, LampFrames.FADE, LampFrames.RISE, LampFrames.STEADY)
     require_calibrated_camera(camera, context.run, frames)
     darks = part_frames(context, FrameRole.DARK)
-    flicker = TYPICAL_FLICKER if camera is None else camera.flicker
+    flicker = flicker_of(camera)
     edges = np.array(protocol.bands)
     nm = np.arange(edges[0], edges[-1] + STEP_NM / 2, STEP_NM)
     places, weights, errors = _places(context, frames, curves, lamp, nm)

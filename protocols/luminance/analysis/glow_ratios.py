@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.calibration import TYPICAL_FLICKER, CameraFile, shutter_sigma
+from labrig.calibration import CameraFile, flicker_of, shutter_sigma
 from labrig.foundation.arrays import FloatArray
 from labrig.foundation.errors import DataError
 from labrig.foundation.region import Region
@@ -102,7 +102,7 @@ def glow_ratios(
         )
     lit = lit.take(np.flatnonzero(lit.usable))
     settings = float(lit.iso[0]), _f_number(lit)
-    flicker = TYPICAL_FLICKER if camera is None else camera.flicker
+    flicker = flicker_of(camera)
     card_dn = lit.values.mean(axis=0)
     noise = np.sqrt(np.square(lit.sigma / lit.values).mean(axis=0)).min()
     parts = []
